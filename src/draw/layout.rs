@@ -1,0 +1,114 @@
+//! Every struct that host and shaders share, declared once.
+//!
+//! `build.rs` includes this file by path and serves [`GLSL`] to `#include "layout.glsl"`. Only four-byte
+//! scalars and their vectors occur, so scalar block layout and `#[repr(C)]` agree without padding; a test
+//! holds the offsets against the compiled SPIR-V.
+
+/// GLSL's names for the host types of the same layout (scalar block layout).
+#[allow(non_camel_case_types, missing_docs)]
+pub mod glsl {
+    pub type uint = u32;
+    pub type int = i32;
+    pub type float = f32;
+    pub type uvec2 = [u32; 2];
+    pub type ivec2 = [i32; 2];
+    pub type vec2 = [f32; 2];
+    pub type vec3 = [f32; 3];
+    pub type vec4 = [f32; 4];
+    pub type mat4 = [[f32; 4]; 4];
+}
+
+/// One field of a shared struct: its name and its byte offset on the host.
+pub type Offset = (&'static str, usize);
+
+macro_rules! shared {
+    ($($(#[$doc:meta])* struct $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ident,)* })*) => {
+        $(
+            $(#[$doc])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+            pub struct $name { $($(#[$field_doc])* pub $field: glsl::$ty,)* }
+        )*
+
+        /// The structs as GLSL declarations.
+        pub const GLSL: &str = concat!($("struct ", stringify!($name), " {\n",
+            $("    ", stringify!($ty), " ", stringify!($field), ";\n",)* "};\n\n",)*);
+
+        /// Name, size in bytes and field offsets of each struct.
+        pub fn structs() -> Vec<(&'static str, usize, Vec<Offset>)> {
+            vec![$((stringify!($name), size_of::<$name>(),
+                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*]),)*]
+        }
+    };
+}
+
+shared! {
+    /// What is the same for every vertex and fragment of a frame.
+    struct Frame {
+        /// From metres relative to the eye (world axes) to clip space; reversed depth.
+        clip_from_relative: mat4,
+        /// The lattice position nearest the eye: positions are integer differences to it, so that nothing
+        /// large is ever rounded.
+        anchor: ivec2,
+        /// Where the anchor lies relative to the eye (x, z), metres.
+        anchor_relative: vec2,
+        /// A height near the eye's, metres, that vertices subtract before anything else.
+        anchor_height: float,
+        /// Where that height lies relative to the eye (y), metres.
+        anchor_height_relative: float,
+        /// Distance of neighbouring samples (x, z), metres.
+        spacing: vec2,
+        /// The last sample of the field, tiling included.
+        last: ivec2,
+        /// Samples stored (x, z): a tiled field repeats after them.
+        stored: ivec2,
+        /// Height = (stored code − zero) · scale, metres.
+        height_zero: float,
+        /// See `height_zero`.
+        height_scale: float,
+        /// Lowest and highest sample, metres: the ends of the tint.
+        height_range: vec2,
+        /// Towards the sun, unit length.
+        sun: vec3,
+        /// Fog: optical density per metre.
+        fog_density: float,
+        /// Horizontal size of a pixel at distance 1 m (perspective), in metres; 0 in an orthographic view.
+        pixel_per_metre_inverse: float,
+        /// Horizontal size of a pixel in an orthographic view, metres.
+        pixel_size: float,
+    }
+
+    /// A lattice mesh placed on the field.
+    struct Instance {
+        /// Lattice position (finest samples) of the mesh's first corner.
+        origin: ivec2,
+        /// Mesh units per side: a turn maps (x, z) to (cells − z, x).
+        cells: uint,
+        /// Samples per mesh unit, as a power of two.
+        shift: uint,
+        /// Quarter turns about the mesh's centre, 0–3.
+        turns: uint,
+        /// Level of detail, 0 the finest: for colouring and counting.
+        level: uint,
+        /// Which batch drew it: for colouring.
+        batch: uint,
+    }
+
+    /// A vertex of a lattice mesh: its height is found in the height texture.
+    struct LatticeVertex {
+        /// Position in mesh units, 0 to `cells`.
+        position: ivec2,
+    }
+
+    /// A vertex that carries its own height.
+    struct ExplicitVertex {
+        /// Lattice position (finest samples).
+        position: ivec2,
+        /// Height, metres.
+        height: float,
+        /// Height of the coarser shape (morph weight 1), metres.
+        target: float,
+        /// Morph weight, 0 the finer shape and 1 the coarser one.
+        morph: float,
+    }
+}

@@ -1,0 +1,154 @@
+//! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
+
+pub mod layout;
+
+use std::ops::Range;
+
+pub use layout::{ExplicitVertex, Instance, LatticeVertex};
+
+/// What a draw's indices address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Source {
+    /// [`Geometry::lattice`] of the resident geometry, once per instance, displaced by the height texture.
+    Lattice,
+    /// [`Geometry::vertices`] of the resident geometry.
+    Resident,
+    /// [`Geometry::vertices`] of the list's own streamed geometry.
+    Streamed,
+}
+
+/// How indices make triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Topology {
+    /// Three indices a triangle, counter-clockwise seen from above.
+    Triangles,
+    /// Each index makes a triangle with the two before it, the winding alternating.
+    Strip,
+}
+
+/// Vertices and indices.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// Vertices without heights, for [`Source::Lattice`].
+    pub lattice: Vec<LatticeVertex>,
+    /// Vertices with heights, for [`Source::Resident`] and [`Source::Streamed`].
+    pub vertices: Vec<ExplicitVertex>,
+    /// Indices into one of the two, as the draw's source says.
+    pub indices: Vec<u32>,
+}
+
+/// One indexed, instanced draw.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Draw {
+    /// What the indices address.
+    pub source: Source,
+    /// How they make triangles.
+    pub topology: Topology,
+    /// Which indices.
+    pub indices: Range<u32>,
+    /// Which of the list's instances.
+    pub instances: Range<u32>,
+}
+
+/// A change to the resident geometry, made before the list is drawn.
+#[derive(Clone, Debug)]
+pub enum Upload {
+    /// Overwrites resident explicit vertices from the given one on.
+    Vertices(u32, Vec<ExplicitVertex>),
+    /// Overwrites resident indices from the given one on.
+    Indices(u32, Vec<u32>),
+}
+
+/// How draws reach the device; the triangles are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Submission {
+    /// One indirect command buffer per pipeline.
+    #[default]
+    Indirect,
+    /// One recorded draw call per draw.
+    Direct,
+}
+
+/// What a technique wants drawn in one view.
+#[derive(Clone, Debug, Default)]
+pub struct DrawList {
+    /// The draws, those of one source and topology side by side.
+    pub draws: Vec<Draw>,
+    /// Instances, addressed by the draws' ranges.
+    pub instances: Vec<Instance>,
+    /// Geometry of this frame only.
+    pub streamed: Geometry,
+    /// Changes to the resident geometry.
+    pub uploads: Vec<Upload>,
+    /// How the draws reach the device.
+    pub submission: Submission,
+}
+
+/// The most that any list of a technique holds: buffers of this size are made once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Limits {
+    /// Draws in a list.
+    pub draws: usize,
+    /// Instances in a list.
+    pub instances: usize,
+    /// Streamed explicit vertices in a list.
+    pub vertices: usize,
+    /// Streamed indices in a list.
+    pub indices: usize,
+    /// Bytes of uploads in a list.
+    pub upload_bytes: usize,
+}
+
+impl Topology {
+    /// Triangles that `indices` indices make, degenerate ones included.
+    pub fn triangles(self, indices: usize) -> usize {
+        match self {
+            Topology::Triangles => indices / 3,
+            Topology::Strip => indices.saturating_sub(2),
+        }
+    }
+}
+
+impl DrawList {
+    /// Empties the list and keeps its memory.
+    pub fn clear(&mut self) {
+        self.draws.clear();
+        self.instances.clear();
+        self.streamed.lattice.clear();
+        self.streamed.vertices.clear();
+        self.streamed.indices.clear();
+        self.uploads.clear();
+        self.submission = Submission::default();
+    }
+
+    /// Triangles the list submits, degenerate ones included.
+    pub fn triangles(&self) -> u64 {
+        self.draws.iter().map(|d| d.topology.triangles(d.indices.len()) as u64 * d.instances.len() as u64).sum()
+    }
+
+    /// What the list holds, in the terms of [`Limits`].
+    pub fn size(&self) -> Limits {
+        let bytes = |upload: &Upload| match upload {
+            Upload::Vertices(_, v) => size_of_val(v.as_slice()),
+            Upload::Indices(_, i) => size_of_val(i.as_slice()),
+        };
+        Limits {
+            draws: self.draws.len(),
+            instances: self.instances.len(),
+            vertices: self.streamed.vertices.len(),
+            indices: self.streamed.indices.len(),
+            upload_bytes: self.uploads.iter().map(bytes).sum(),
+        }
+    }
+}
+
+impl Limits {
+    /// Whether nothing in `size` exceeds these limits.
+    pub fn hold(&self, size: &Limits) -> bool {
+        size.draws <= self.draws
+            && size.instances <= self.instances
+            && size.vertices <= self.vertices
+            && size.indices <= self.indices
+            && size.upload_bytes <= self.upload_bytes
+    }
+}

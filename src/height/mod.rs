@@ -1,0 +1,333 @@
+//! Height data: a rectangular field of samples, where it lies, and where it has none.
+
+use glam::DVec3;
+
+/// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {place}: {what}")]
+pub struct Error {
+    /// The file's name as given.
+    pub file: String,
+    /// The header field, line, row or byte position at fault.
+    pub place: String,
+    /// What was expected and what was found.
+    pub what: String,
+}
+
+impl Error {
+    /// An error at a place of a file.
+    pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
+        Self { file: file.into(), place: place.into(), what: what.to_string() }
+    }
+}
+
+/// Heights as they are kept, row by row from the north-west corner.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// Metres.
+    F32(Vec<f32>),
+    /// 16-bit codes: height = (code − zero) · scale, computed in f32 in that order.
+    Coded {
+        /// One code a sample.
+        codes: Vec<u16>,
+        /// The code of height 0, an integer within ±2^24.
+        zero: f32,
+        /// Metres per code.
+        scale: f32,
+    },
+}
+
+impl Samples {
+    /// Codes for signed 16-bit metres.
+    pub fn from_i16(values: impl IntoIterator<Item = i16>) -> Self {
+        let codes = values.into_iter().map(|v| (v as u16) ^ 0x8000).collect();
+        Samples::Coded { codes, zero: 32768.0, scale: 1.0 }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Samples::F32(heights) => heights.len(),
+            Samples::Coded { codes, .. } => codes.len(),
+        }
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Height of sample `k`, metres.
+    #[inline]
+    pub fn height(&self, k: usize) -> f32 {
+        match self {
+            Samples::F32(heights) => heights[k],
+            Samples::Coded { codes, zero, scale } => (f32::from(codes[k]) - zero) * scale,
+        }
+    }
+
+    /// Sets sample `k` to `height` metres, or to the nearest code.
+    pub fn set(&mut self, k: usize, height: f32) {
+        match self {
+            Samples::F32(heights) => heights[k] = height,
+            Samples::Coded { codes, zero, scale } => codes[k] = (height / *scale + *zero).round() as u16,
+        }
+    }
+
+    /// Multiplies every height.
+    pub fn multiply(&mut self, factor: f32) {
+        match self {
+            Samples::F32(heights) => heights.iter_mut().for_each(|h| *h *= factor),
+            Samples::Coded { scale, .. } => *scale *= factor,
+        }
+    }
+}
+
+/// Samples without data, one bit each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Holes {
+    words: Vec<u64>,
+    count: u64,
+}
+
+impl Holes {
+    /// No hole among `len` samples.
+    pub fn none(len: usize) -> Self {
+        Self { words: vec![0; len.div_ceil(64)], count: 0 }
+    }
+
+    /// Makes sample `k` a hole.
+    pub fn insert(&mut self, k: usize) {
+        let bit = 1 << (k % 64);
+        self.count += u64::from(self.words[k / 64] & bit == 0);
+        self.words[k / 64] |= bit;
+    }
+
+    /// Whether sample `k` is a hole.
+    #[inline]
+    pub fn contains(&self, k: usize) -> bool {
+        self.words[k / 64] >> (k % 64) & 1 != 0
+    }
+
+    /// How many samples are holes.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+/// A rectangular field of heights, `x_count` × `z_count` samples (at least 2 × 2), possibly repeated.
+///
+/// Sample `(i, j)` lies at `origin + (i·dx, j·dz)`: x east, z south. A hole's sample holds a height
+/// interpolated from around it, so that meshes run smoothly to the hole's edge; it counts in no statistic.
+#[derive(Clone, Debug)]
+pub struct Field {
+    samples: Samples,
+    holes: Holes,
+    stored: [u32; 2],
+    tiles: [u32; 2],
+    /// Distance of neighbouring samples (x, z), metres.
+    pub spacing: [f64; 2],
+    /// World position of sample (0, 0) (x, z), metres.
+    pub origin: [f64; 2],
+    /// Coordinate reference system, as the file names it.
+    pub crs: Option<String>,
+}
+
+/// Lowest, highest and mean height of the samples that are no holes, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Lowest.
+    pub min: f32,
+    /// Highest.
+    pub max: f32,
+    /// Mean.
+    pub mean: f64,
+}
+
+impl Field {
+    /// A field of `x_count · z_count` samples; samples under holes may hold anything and are filled.
+    ///
+    /// # Panics
+    /// If the number of samples is not `x_count · z_count`, a side is below 2, or a spacing is not positive.
+    pub fn new(samples: Samples, [x_count, z_count]: [u32; 2], spacing: [f64; 2], holes: Holes) -> Self {
+        assert!(x_count >= 2 && z_count >= 2, "a field has at least 2 × 2 samples");
+        assert_eq!(samples.len(), x_count as usize * z_count as usize);
+        assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
+        let mut field =
+            Self { samples, holes, stored: [x_count, z_count], tiles: [1, 1], spacing, origin: [0.0, 0.0], crs: None };
+        field.fill_holes();
+        field
+    }
+
+    /// The field repeated `tiles` times along (x, z); sample (0, 0) follows the last one.
+    pub fn tiled(mut self, tiles: [u32; 2]) -> Self {
+        self.tiles = tiles;
+        self
+    }
+
+    /// Samples along (x, z), tiling included.
+    pub fn size(&self) -> [u32; 2] {
+        [self.stored[0] * self.tiles[0], self.stored[1] * self.tiles[1]]
+    }
+
+    /// Samples held in memory along (x, z).
+    pub fn stored(&self) -> [u32; 2] {
+        self.stored
+    }
+
+    /// The samples held in memory, row by row.
+    pub fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// The holes among the samples held in memory.
+    pub fn holes(&self) -> &Holes {
+        &self.holes
+    }
+
+    /// Whether the field repeats.
+    pub fn is_tiled(&self) -> bool {
+        self.tiles != [1, 1]
+    }
+
+    #[inline]
+    fn index(&self, mut i: u32, mut j: u32) -> usize {
+        if self.is_tiled() {
+            i %= self.stored[0];
+            j %= self.stored[1];
+        }
+        j as usize * self.stored[0] as usize + i as usize
+    }
+
+    /// Height of sample `(i, j)`, metres; always finite.
+    #[inline]
+    pub fn height(&self, i: u32, j: u32) -> f32 {
+        self.samples.height(self.index(i, j))
+    }
+
+    /// Whether sample `(i, j)` has no data.
+    #[inline]
+    pub fn is_hole(&self, i: u32, j: u32) -> bool {
+        self.holes.count > 0 && self.holes.contains(self.index(i, j))
+    }
+
+    /// World position of sample `(i, j)`.
+    pub fn world(&self, i: u32, j: u32) -> DVec3 {
+        self.world_at(f64::from(i), f64::from(j), f64::from(self.height(i, j)))
+    }
+
+    /// World position of a lattice position and height.
+    pub fn world_at(&self, i: f64, j: f64, height: f64) -> DVec3 {
+        DVec3::new(self.origin[0] + i * self.spacing[0], height, self.origin[1] + j * self.spacing[1])
+    }
+
+    /// Height bilinearly interpolated at a world position, or `None` outside or over a hole.
+    pub fn height_at(&self, x: f64, z: f64) -> Option<f64> {
+        let [w, h] = self.size();
+        let u = (x - self.origin[0]) / self.spacing[0];
+        let v = (z - self.origin[1]) / self.spacing[1];
+        if !(0.0..=f64::from(w - 1)).contains(&u) || !(0.0..=f64::from(h - 1)).contains(&v) {
+            return None;
+        }
+        let (i, j) = ((u as u32).min(w - 2), (v as u32).min(h - 2));
+        let (u, v) = (u - f64::from(i), v - f64::from(j));
+        let corners = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
+        if corners.iter().any(|&(i, j)| self.is_hole(i, j)) {
+            return None;
+        }
+        let [a, b, c, d] = corners.map(|(i, j)| f64::from(self.height(i, j)));
+        Some((a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v)
+    }
+
+    /// Statistics of the samples that are no holes; zeros if all are holes.
+    pub fn statistics(&self) -> Statistics {
+        let (mut min, mut max, mut sum, mut count) = (f32::INFINITY, f32::NEG_INFINITY, 0.0, 0u64);
+        for k in 0..self.samples.len() {
+            if self.holes.count == 0 || !self.holes.contains(k) {
+                let h = self.samples.height(k);
+                (min, max, sum, count) = (min.min(h), max.max(h), sum + f64::from(h), count + 1);
+            }
+        }
+        match count {
+            0 => Statistics { min: 0.0, max: 0.0, mean: 0.0 },
+            _ => Statistics { min, max, mean: sum / count as f64 },
+        }
+    }
+
+    /// The largest difference, metres, between the two ways to split a cell into triangles:
+    /// |h00 + h11 − h10 − h01| / 2 over all cells without holes. A property of the data.
+    pub fn cell_ambiguity(&self) -> f32 {
+        let [w, h] = self.stored;
+        let mut largest = 0.0f32;
+        for j in 0..h - 1 {
+            for i in 0..w - 1 {
+                let corners = [(i, j), (i + 1, j + 1), (i + 1, j), (i, j + 1)];
+                if self.holes.count == 0 || !corners.iter().any(|&(i, j)| self.is_hole(i, j)) {
+                    let [a, d, b, c] = corners.map(|(i, j)| self.height(i, j));
+                    largest = largest.max((a + d - b - c).abs() / 2.0);
+                }
+            }
+        }
+        largest
+    }
+
+    /// Gives the land under holes the heights around them and forgets the holes.
+    pub fn without_holes(mut self) -> Self {
+        self.holes = Holes::none(self.samples.len());
+        self
+    }
+
+    /// Fills the samples under holes by push-pull: means of the known samples on ever coarser grids, then
+    /// each hole takes the value of the finest coarser cell that knows one, bilinearly.
+    fn fill_holes(&mut self) {
+        if self.holes.count == 0 {
+            return;
+        }
+        let [w, h] = self.stored.map(|n| n as usize);
+        let base: Vec<f32> = (0..self.samples.len())
+            .map(|k| if self.holes.contains(k) { f32::NAN } else { self.samples.height(k) })
+            .collect();
+        for (k, height) in pull(base, w, h).into_iter().enumerate() {
+            if self.holes.contains(k) {
+                self.samples.set(k, height);
+            }
+        }
+    }
+}
+
+/// Fills the NaNs of a grid from the means of 2 × 2 blocks, recursively.
+fn pull(mut grid: Vec<f32>, w: usize, h: usize) -> Vec<f32> {
+    if !grid.iter().any(|v| v.is_nan()) {
+        return grid;
+    }
+    if w == 1 && h == 1 {
+        return vec![0.0];
+    }
+    let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
+    let mut half = Vec::with_capacity(half_w * half_h);
+    for j in 0..half_h {
+        for i in 0..half_w {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (x, z) in [(2 * i, 2 * j), (2 * i + 1, 2 * j), (2 * i, 2 * j + 1), (2 * i + 1, 2 * j + 1)] {
+                if x < w && z < h && !grid[z * w + x].is_nan() {
+                    sum += f64::from(grid[z * w + x]);
+                    count += 1.0;
+                }
+            }
+            half.push((sum / count) as f32);
+        }
+    }
+    let half = pull(half, half_w, half_h);
+    for (k, value) in grid.iter_mut().enumerate().filter(|(_, v)| v.is_nan()) {
+        let at = |n: usize, last: usize| {
+            let t = (n as f32 - 0.5) / 2.0;
+            let low = t.max(0.0) as usize;
+            (low, (low + 1).min(last), (t - low as f32).clamp(0.0, 1.0))
+        };
+        let (i0, i1, u) = at(k % w, half_w - 1);
+        let (j0, j1, v) = at(k / w, half_h - 1);
+        let row = |j: usize| half[j * half_w + i0] * (1.0 - u) + half[j * half_w + i1] * u;
+        *value = row(j0) * (1.0 - v) + row(j1) * v;
+    }
+    grid
+}

@@ -1,0 +1,14 @@
+//! **cuesta** draws large terrain with a bounded error: every family of continuous level of detail, side by
+//! side, on the same data, through one executor on Vulkan.
+//!
+//! Modules in dependency order; each uses only those above it (`tests/architecture.rs` holds this):
+//!
+//! - [`view`]: eye, projection, frustum, tolerance.
+//! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
+//! - [`draw`]: the neck: a frame as plain data.
+
+pub mod view;
+
+pub mod height;
+
+pub mod draw;
