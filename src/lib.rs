@@ -6,9 +6,12 @@
 //! - [`view`]: eye, projection, frustum, tolerance.
 //! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
 //! - [`draw`]: the neck: a frame as plain data.
+//! - [`lod`]: the techniques: from a view to a frame.
 
 pub mod view;
 
 pub mod height;
 
 pub mod draw;
+
+pub mod lod;

@@ -1,6 +1,8 @@
 //! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
 
+pub mod expand;
 pub mod layout;
+pub mod place;
 
 use std::ops::Range;
 

@@ -1,5 +1,8 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+pub mod rtin;
+pub mod surface;
+
 use glam::DVec3;
 
 /// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.

@@ -1,0 +1,107 @@
+//! Surfaces over the lattice: triangles whose corners lie on samples' positions, and how far they are from
+//! the samples inside them.
+
+use super::Field;
+
+/// A corner of a drawn triangle: lattice position (finest samples) and height, metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Corner {
+    /// East.
+    pub x: i32,
+    /// South.
+    pub z: i32,
+    /// Height, metres.
+    pub y: f32,
+}
+
+/// Three corners, counter-clockwise seen from above if the triangle faces up.
+pub type Triangle = [Corner; 3];
+
+/// Twice the area in plan, in samples²; positive if the triangle faces up, 0 if it is degenerate.
+pub fn doubled_area([a, b, c]: &Triangle) -> i64 {
+    let (bx, bz) = (i64::from(b.x) - i64::from(a.x), i64::from(b.z) - i64::from(a.z));
+    let (cx, cz) = (i64::from(c.x) - i64::from(a.x), i64::from(c.z) - i64::from(a.z));
+    bz * cx - bx * cz
+}
+
+/// Calls `visit(x, z, y)` for every lattice position inside or on the border of an up-facing triangle,
+/// with the triangle's height there.
+pub fn visit_samples(triangle: &Triangle, mut visit: impl FnMut(u32, u32, f64)) {
+    let area = doubled_area(triangle);
+    debug_assert!(area > 0, "faces up: {triangle:?}");
+    // Edge functions w = wx·x + wz·z + w0, each zero on the edge opposite its corner.
+    let edge = |p: &Corner, q: &Corner| {
+        let (px, pz, qx, qz) = (i64::from(p.x), i64::from(p.z), i64::from(q.x), i64::from(q.z));
+        (qz - pz, px - qx, qx * pz - px * qz)
+    };
+    let [a, b, c] = triangle;
+    let edges = [edge(b, c), edge(c, a), edge(a, b)];
+    let heights = triangle.map(|corner| f64::from(corner.y));
+    let (west, east) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+    for z in a.z.min(b.z).min(c.z)..=a.z.max(b.z).max(c.z) {
+        let (mut first, mut last) = (i64::from(west), i64::from(east));
+        let mut rows = [0i64; 3];
+        for (row, &(wx, wz, w0)) in rows.iter_mut().zip(&edges) {
+            *row = wz * i64::from(z) + w0;
+            match wx.signum() {
+                1 => first = first.max((-*row).div_euclid(wx) + i64::from((-*row).rem_euclid(wx) != 0)),
+                -1 => last = last.min(row.div_euclid(-wx)),
+                _ if *row < 0 => last = i64::MIN,
+                _ => {}
+            }
+        }
+        for x in first..=last {
+            let weight = |k: usize| (edges[k].0 * x + rows[k]) as f64;
+            let y = (weight(0) * heights[0] + weight(1) * heights[1] + weight(2) * heights[2]) / area as f64;
+            visit(x as u32, z as u32, y);
+        }
+    }
+}
+
+/// The largest vertical distance, metres, of an up-facing triangle from the field's samples inside it,
+/// holes excepted.
+pub fn deviation(field: &Field, triangle: &Triangle) -> f32 {
+    let mut largest = 0.0f64;
+    visit_samples(triangle, |x, z, y| {
+        if !field.is_hole(x, z) {
+            largest = largest.max((y - f64::from(field.height(x, z))).abs());
+        }
+    });
+    // Upwards: the bound must not shrink by rounding.
+    (largest as f32).next_up() * f32::from(largest > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(x: i32, z: i32, y: f32) -> Corner {
+        Corner { x, z, y }
+    }
+
+    #[test]
+    fn samples_of_a_triangle_by_brute_force() {
+        let triangle = [corner(1, 2, 3.0), corner(4, 11, -5.0), corner(9, 4, 7.5)];
+        let area = doubled_area(&triangle) as f64;
+        assert!(area > 0.0);
+        let mut visited = Vec::new();
+        visit_samples(&triangle, |x, z, y| visited.push((x as i32, z as i32, y)));
+        let mut expected = Vec::new();
+        for z in 0..20 {
+            for x in 0..20 {
+                let p = corner(x, z, 0.0);
+                let [a, b, c] = triangle;
+                let w = [[p, b, c], [a, p, c], [a, b, p]].map(|t| doubled_area(&t));
+                if w.iter().all(|w| *w >= 0) {
+                    let y = (0..3).map(|k| w[k] as f64 / area * f64::from(triangle[k].y)).sum::<f64>();
+                    expected.push((x, z, y));
+                }
+            }
+        }
+        assert_eq!(visited.len(), expected.len());
+        for (v, e) in visited.iter().zip(&expected) {
+            assert_eq!((v.0, v.1), (e.0, e.1));
+            assert!((v.2 - e.2).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Every sample of the field, in every view: the truth that the others are compared with.
+//!
+//! One static grid mesh, instanced over the field and displaced in the vertex program. Nothing is culled.
+
+use std::sync::Arc;
+
+use super::{Entry, Settings, Technique};
+use crate::draw::{Draw, DrawList, Geometry, Instance, LatticeVertex, Limits, Source, Topology};
+use crate::height::{Field, rtin};
+use crate::view::View;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "brute-force",
+    about: "every sample, always: ground truth and baseline",
+    paper: "none",
+    variants: &[],
+    settings: &[],
+    build: |field, _: &Settings| Box::new(BruteForce::new(field)),
+};
+
+/// Cells along a side of the mesh. 64 keep its (65² vertices) transformed vertices in most GPUs' caches.
+const CELLS: i32 = 64;
+
+struct BruteForce {
+    mesh: Geometry,
+    instances: Vec<Instance>,
+}
+
+impl BruteForce {
+    fn new(field: Arc<Field>) -> Self {
+        let [w, h] = field.size();
+        let blocks = [w, h].map(|n| (n - 1).div_ceil(CELLS as u32) as i32);
+        let instances = (0..blocks[1])
+            .flat_map(|j| (0..blocks[0]).map(move |i| [i * CELLS, j * CELLS]))
+            .map(|origin| Instance { origin, cells: CELLS as u32, ..Instance::default() })
+            .collect();
+        Self { mesh: grid(), instances }
+    }
+}
+
+fn grid() -> Geometry {
+    let positions = (0..=CELLS).flat_map(|z| (0..=CELLS).map(move |x| [x, z]));
+    let index = |[x, z]: [i32; 2]| (z * (CELLS + 1) + x) as u32;
+    let cells = (0..CELLS).flat_map(|j| (0..CELLS).flat_map(move |i| rtin::cell(i, j)));
+    Geometry {
+        lattice: positions.map(|position| LatticeVertex { position }).collect(),
+        indices: cells.flatten().map(index).collect(),
+        ..Geometry::default()
+    }
+}
+
+impl Technique for BruteForce {
+    fn resident(&self) -> &Geometry {
+        &self.mesh
+    }
+
+    fn limits(&self) -> Limits {
+        Limits { draws: 1, instances: self.instances.len(), ..Limits::default() }
+    }
+
+    fn select(&mut self, _: &View, list: &mut DrawList) {
+        list.instances.extend_from_slice(&self.instances);
+        list.draws.push(Draw {
+            source: Source::Lattice,
+            topology: Topology::Triangles,
+            indices: 0..self.mesh.indices.len() as u32,
+            instances: 0..self.instances.len() as u32,
+        });
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,184 @@
+//! The flat mesh of a block: one grid of vertices, and for each level the indices of its centre and, for
+//! each border mask, of its border.
+
+use std::ops::Range;
+
+use crate::draw::{Geometry, LatticeVertex};
+use crate::height::rtin;
+
+/// Sides of a block that meet a coarser one, as bits.
+pub mod side {
+    /// x = 0.
+    pub const LEFT: u8 = 1;
+    /// z = 0.
+    pub const TOP: u8 = 2;
+    /// x = cells.
+    pub const RIGHT: u8 = 4;
+    /// z = cells.
+    pub const BOTTOM: u8 = 8;
+}
+
+/// The six masks that give all sixteen by quarter turns: no side, one, two adjacent, two opposite, three,
+/// four. By Burnside's lemma (16 + 2 + 4 + 2) / 4 = 6.
+pub const CLASSES: [u8; 6] = [0b0000, 0b0001, 0b0011, 0b0101, 0b0111, 0b1111];
+
+/// A quarter turn maps left to top, top to right, right to bottom, bottom to left: one bit to the next.
+fn turned(mask: u8, turns: u32) -> u8 {
+    ((mask << turns) | (mask >> (4 - turns))) & 15
+}
+
+/// Class and quarter turns (0–3) that give a mask.
+pub fn class_of(mask: u8) -> (usize, u32) {
+    let find = |turns| CLASSES.iter().position(|&class| turned(class, turns) == mask).map(|class| (class, turns));
+    (0..4).find_map(find).expect("six classes and their turns cover all masks")
+}
+
+/// Which border masks have indices of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Masks {
+    /// All sixteen, as published.
+    Sixteen,
+    /// The six of [`CLASSES`], turned per instance.
+    Six,
+}
+
+impl Masks {
+    fn list(self) -> Vec<u8> {
+        match self {
+            Masks::Sixteen => (0..16).collect(),
+            Masks::Six => CLASSES.to_vec(),
+        }
+    }
+
+    /// Which of the borders to draw for a mask, and how often to turn it.
+    pub fn border(self, mask: u8) -> (usize, u32) {
+        match self {
+            Masks::Sixteen => (usize::from(mask), 0),
+            Masks::Six => class_of(mask),
+        }
+    }
+
+    /// How many borders a level has.
+    pub fn count(self) -> usize {
+        self.list().len()
+    }
+}
+
+/// The mesh with its index ranges.
+pub struct BlockMesh {
+    /// (cells + 1)² vertices; borders of every level first, then centres of every level.
+    pub geometry: Geometry,
+    /// By level, then mask or class.
+    pub borders: Vec<Vec<Range<u32>>>,
+    /// By level; empty where a level is all border.
+    pub centres: Vec<Range<u32>>,
+}
+
+impl BlockMesh {
+    /// A block of `cells` (a power of two) cells a side with log2(cells) + 1 levels.
+    pub fn new(cells: i32, masks: Masks) -> Self {
+        let levels = cells.ilog2() + 1;
+        let positions = (0..=cells).flat_map(|z| (0..=cells).map(move |x| [x, z]));
+        let lattice = positions.map(|position| LatticeVertex { position }).collect();
+        let mut indices: Vec<u32> = Vec::new();
+        let mut append = |level: u32, triangles: Vec<[[i32; 2]; 3]>| {
+            let first = indices.len() as u32;
+            let index = |[x, z]: [i32; 2]| (((z * (cells + 1)) + x) << level) as u32;
+            indices.extend(triangles.into_iter().flatten().map(index));
+            first..indices.len() as u32
+        };
+        let borders = (0..levels)
+            .map(|level| masks.list().iter().map(|&mask| append(level, border(cells >> level, mask))).collect())
+            .collect();
+        let centres = (0..levels).map(|level| append(level, centre(cells >> level))).collect();
+        Self { geometry: Geometry { lattice, indices, ..Geometry::default() }, borders, centres }
+    }
+}
+
+/// Whether cell `(i, j)` of `n` × `n` touches a side.
+fn on_border(i: i32, j: i32, n: i32) -> bool {
+    i == 0 || j == 0 || i == n - 1 || j == n - 1
+}
+
+/// Triangles of all cells off the border.
+pub fn centre(n: i32) -> Vec<[[i32; 2]; 3]> {
+    cells(n).filter(|&(i, j)| !on_border(i, j, n)).flat_map(|(i, j)| rtin::cell(i, j)).collect()
+}
+
+/// Triangles of the border cells: on a side of the mask every second vertex falls onto the one before it,
+/// and what collapses is dropped.
+pub fn border(n: i32, mask: u8) -> Vec<[[i32; 2]; 3]> {
+    let snap = |[x, z]: [i32; 2]| {
+        let on = |bit: u8, at: bool| mask & bit != 0 && at;
+        if on(side::TOP, z == 0) || on(side::BOTTOM, z == n) {
+            [x & !1, z]
+        } else if on(side::LEFT, x == 0) || on(side::RIGHT, x == n) {
+            [x, z & !1]
+        } else {
+            [x, z]
+        }
+    };
+    cells(n)
+        .filter(|&(i, j)| on_border(i, j, n))
+        .flat_map(|(i, j)| rtin::cell(i, j))
+        .map(|t| t.map(snap))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect()
+}
+
+fn cells(n: i32) -> impl Iterator<Item = (i32, i32)> {
+    (0..n).flat_map(move |j| (0..n).map(move |i| (i, j)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn set(triangles: impl IntoIterator<Item = [[i32; 2]; 3]>) -> BTreeSet<[[i32; 2]; 3]> {
+        // Corners in cyclic order from the smallest: the winding counts.
+        triangles.into_iter().map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
+    }
+
+    /// The proof by enumeration that six classes and quarter turns draw what sixteen masks draw.
+    #[test]
+    fn six_turned_classes_are_the_sixteen_masks() {
+        for n in [2, 4, 8, 16, 32, 64, 128, 256] {
+            for mask in 0..16 {
+                let (class, turns) = class_of(mask);
+                let turn = |[x, z]: [i32; 2]| [[x, z], [n - z, x], [n - x, n - z], [z, n - x]][turns as usize];
+                let turned = border(n, CLASSES[class]).into_iter().map(|t| t.map(turn));
+                assert_eq!(set(turned), set(border(n, mask)), "n {n}, mask {mask:04b}");
+            }
+            let quarter = centre(n).into_iter().map(|t| t.map(|[x, z]| [n - z, x]));
+            assert_eq!(set(quarter), set(centre(n)));
+        }
+    }
+
+    #[test]
+    fn border_and_centre_cover_the_block_once() {
+        for n in [1, 2, 4, 8, 16] {
+            for mask in if n == 1 { 0..1 } else { 0..16 } {
+                let doubled: i32 = border(n, mask)
+                    .iter()
+                    .chain(&centre(n))
+                    .map(|[a, b, c]| (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1]))
+                    .inspect(|area| assert!(*area > 0))
+                    .sum();
+                assert_eq!(doubled, 2 * n * n, "n {n}, mask {mask:04b}");
+            }
+        }
+    }
+
+    #[test]
+    fn index_counts() {
+        // 65² vertices: the border of the finest level has 4·64 − 4 cells, two triangles each.
+        let sixteen = BlockMesh::new(64, Masks::Sixteen);
+        assert_eq!(sixteen.borders[0][0].len(), 3 * 2 * (4 * 64 - 4));
+        assert_eq!(sixteen.centres[0].len(), 3 * 2 * 62 * 62);
+        assert_eq!(sixteen.borders.len(), 7);
+        assert!(sixteen.centres[5].is_empty() && sixteen.centres[6].is_empty());
+        let six = BlockMesh::new(64, Masks::Six);
+        assert!(six.geometry.indices.len() < sixteen.geometry.indices.len());
+    }
+}

@@ -1,0 +1,219 @@
+//! GeoMipMapping with the heights found in the vertex program.
+//!
+//! After W. H. de Boer, "Fast terrain rendering using geometrical mipmapping" (2000), and A. Tabaković,
+//! "3D Terrain with Level of Detail" (ATLOD, 2023): blocks of 2^n + 1 vertices, one flat mesh for all of them,
+//! its indices held per level as a centre and, per border mask, a border.
+//!
+//! Where this differs from ATLOD, and why:
+//! - level 0 is the finest, as everywhere here;
+//! - neighbours are brought within one level by propagation: by distance alone they are not, on steep land;
+//! - partial blocks at the far edges are drawn, not dropped: what sticks out collapses onto the edge;
+//! - the six border classes of its outlook are the default, its sixteen masks an option; so are its levels by
+//!   distance beside levels by error;
+//! - blocks are culled by a quadtree and drawn instanced, all in one indirect call; `draw-per-block` records
+//!   its two draws for each block.
+//!
+//! Laws kept: watertight, covered once, error within tolerance (`distance=error`), no state between views.
+
+pub mod blocks;
+pub mod levels;
+pub mod mesh;
+
+use std::sync::Arc;
+
+use self::blocks::Blocks;
+use self::levels::Distance;
+use self::mesh::{BlockMesh, Masks, side};
+use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::height::Field;
+use crate::view::View;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "geomipmap",
+    about: "blocks of one flat mesh, level by error or distance, borders stitched by index",
+    paper: "de Boer 2000; Tabaković 2023 (ATLOD)",
+    variants: &[Variant { name: "draw-per-block", about: "two recorded draws a block, as published" }],
+    settings: &[
+        Setting {
+            key: "block",
+            values: Values::Words(&["9", "17", "33", "65", "129", "257"]),
+            default: "65",
+            about: "vertices along a side of a block",
+        },
+        Setting {
+            key: "distance",
+            values: Values::Words(&["error", "linear", "exponential"]),
+            default: "error",
+            about: "what sets a block's level: the tolerance, or its centre's distance",
+        },
+        Setting {
+            key: "base",
+            values: Values::Number(1e-3, 1e9),
+            default: "400",
+            about: "base distance of linear and exponential levels, in samples",
+        },
+        Setting {
+            key: "masks",
+            values: Values::Words(&["6", "16"]),
+            default: "6",
+            about: "border masks held: six turned classes, or all sixteen",
+        },
+    ],
+    build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
+};
+
+struct GeoMipMap {
+    blocks: Blocks,
+    mesh: BlockMesh,
+    masks: Masks,
+    distance: Distance,
+    draw_per_block: bool,
+    /// Bytes of indices with six classes and with sixteen masks.
+    index_bytes: [usize; 2],
+    /// Level of every block in the current view.
+    levels: Vec<u8>,
+    /// The blocks in sight, with the key that sorts them into draws.
+    visible: Vec<(u32, u32)>,
+}
+
+impl GeoMipMap {
+    fn new(field: &Arc<Field>, settings: &Settings) -> Self {
+        let cells = settings.number("block") as i32 - 1;
+        let base = settings.number("base") * field.spacing[0].max(field.spacing[1]);
+        let masks = if settings.word("masks") == "16" { Masks::Sixteen } else { Masks::Six };
+        let bytes = |masks| size_of_val(BlockMesh::new(cells, masks).geometry.indices.as_slice());
+        Self {
+            blocks: Blocks::new(field, cells),
+            mesh: BlockMesh::new(cells, masks),
+            masks,
+            distance: match settings.word("distance") {
+                "linear" => Distance::Linear(base),
+                "exponential" => Distance::Exponential(base),
+                _ => Distance::Error,
+            },
+            draw_per_block: settings.variant() == Some("draw-per-block"),
+            index_bytes: [bytes(Masks::Six), bytes(Masks::Sixteen)],
+            levels: Vec::new(),
+            visible: Vec::new(),
+        }
+    }
+
+    /// The sides on which a block meets a coarser one.
+    fn mask(&self, block: usize) -> u8 {
+        let [w, h] = self.blocks.count.map(|n| n as usize);
+        let (i, j) = (block % w, block / w);
+        let coarser = |exists: bool, neighbour: usize, bit: u8| {
+            if exists && self.levels[neighbour] > self.levels[block] { bit } else { 0 }
+        };
+        coarser(i > 0, block.wrapping_sub(1), side::LEFT)
+            | coarser(j > 0, block.wrapping_sub(w), side::TOP)
+            | coarser(i + 1 < w, block + 1, side::RIGHT)
+            | coarser(j + 1 < h, block + w, side::BOTTOM)
+    }
+
+    fn instance(&self, block: usize) -> Instance {
+        let (i, j) = (block as u32 % self.blocks.count[0], block as u32 / self.blocks.count[0]);
+        let level = self.levels[block];
+        let (_, turns) = self.masks.border(self.mask(block));
+        let at = [i as i32, j as i32];
+        Instance {
+            origin: at.map(|n| n * self.blocks.cells),
+            cells: self.blocks.cells as u32,
+            shift: 0,
+            turns: turns.max(blocks::coarsest_turn(at, self.blocks.cells >> level)),
+            level: u32::from(level),
+            batch: 0,
+        }
+    }
+
+    /// Sorts what is visible into runs of the same level and border and appends their instances.
+    fn fill_instances(&mut self, view: &View, list: &mut DrawList) {
+        let mut visible = std::mem::take(&mut self.visible);
+        visible.clear();
+        self.blocks.visit_visible(&view.frustum(), &mut |block| {
+            let (border, _) = self.masks.border(self.mask(block));
+            let key = u32::from(self.levels[block]) * self.masks.count() as u32 + border as u32;
+            visible.push((key, block as u32));
+        });
+        visible.sort_unstable();
+        list.instances.extend(visible.iter().map(|&(_, block)| self.instance(block as usize)));
+        self.visible = visible;
+    }
+
+    /// One draw for the borders of each level and mask, one for the centres of each level.
+    fn draw_instanced(&self, list: &mut DrawList) {
+        let masks = self.masks.count() as u32;
+        let mut first = 0u32;
+        for run in self.visible.chunk_by(|a, b| a.0 / masks == b.0 / masks) {
+            let level = (run[0].0 / masks) as usize;
+            let mut border_first = first;
+            for border_run in run.chunk_by(|a, b| a.0 == b.0) {
+                let instances = border_first..border_first + border_run.len() as u32;
+                border_first = instances.end;
+                let border = (border_run[0].0 % masks) as usize;
+                push(list, &self.mesh.borders[level][border], instances);
+            }
+            push(list, &self.mesh.centres[level], first..border_first);
+            first = border_first;
+        }
+    }
+
+    /// The published way: centre and border of each block are a draw of their own.
+    fn draw_per_block(&self, list: &mut DrawList) {
+        let masks = self.masks.count() as u32;
+        list.submission = Submission::Direct;
+        for (k, &(key, _)) in (0u32..).zip(&self.visible) {
+            let (level, border) = ((key / masks) as usize, (key % masks) as usize);
+            push(list, &self.mesh.centres[level], k..k + 1);
+            push(list, &self.mesh.borders[level][border], k..k + 1);
+        }
+    }
+}
+
+fn push(list: &mut DrawList, indices: &std::ops::Range<u32>, instances: std::ops::Range<u32>) {
+    if indices.is_empty() {
+        return;
+    }
+    for instance in &mut list.instances[instances.start as usize..instances.end as usize] {
+        instance.batch = list.draws.len() as u32;
+    }
+    let indices = indices.clone();
+    list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+}
+
+impl Technique for GeoMipMap {
+    fn resident(&self) -> &Geometry {
+        &self.mesh.geometry
+    }
+
+    fn limits(&self) -> Limits {
+        let blocks = (self.blocks.count[0] * self.blocks.count[1]) as usize;
+        let instanced = self.blocks.levels as usize * (self.masks.count() + 1);
+        let draws = if self.draw_per_block { 2 * blocks } else { instanced };
+        Limits { draws, instances: blocks, ..Limits::default() }
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.distance.levels(&self.blocks, view, &mut self.levels);
+        self.fill_instances(view, list);
+        if self.draw_per_block {
+            self.draw_per_block(list);
+        } else {
+            self.draw_instanced(list);
+        }
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        self.distance == Distance::Error
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![
+            ("blocks", f64::from(self.blocks.count[0] * self.blocks.count[1]), ""),
+            ("index bytes, six classes", self.index_bytes[0] as f64, "B"),
+            ("index bytes, sixteen masks", self.index_bytes[1] as f64, "B"),
+        ]
+    }
+}

@@ -1,0 +1,68 @@
+//! The techniques: each a room behind the one door [`Technique`], all in the one table [`TECHNIQUES`].
+//!
+//! Pure computation: no device, no file, no clock. Rooms never use each other.
+
+pub mod brute_force;
+pub mod geomipmap;
+pub mod settings;
+
+use std::sync::Arc;
+
+use crate::draw::{DrawList, Geometry, Limits};
+use crate::height::Field;
+use crate::view::View;
+pub use settings::{Setting, Settings, Values};
+
+/// A way to choose what is drawn.
+pub trait Technique: Send {
+    /// Geometry that stays in device-local memory.
+    fn resident(&self) -> &Geometry;
+
+    /// The most that any list of this technique holds.
+    fn limits(&self) -> Limits;
+
+    /// Fills the (empty) list with what this view needs.
+    fn select(&mut self, view: &View, list: &mut DrawList);
+
+    /// Whether the lists keep the view's tolerance under its metric.
+    fn keeps_tolerance(&self) -> bool;
+
+    /// What is worth knowing about the data it prepared: name, value, unit.
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        Vec::new()
+    }
+}
+
+/// A named form of a technique, chosen as `technique:variant`.
+#[derive(Clone, Copy, Debug)]
+pub struct Variant {
+    /// Its name.
+    pub name: &'static str,
+    /// One line.
+    pub about: &'static str,
+}
+
+/// One row of the table of techniques.
+pub struct Entry {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// One line.
+    pub about: &'static str,
+    /// Where it was published.
+    pub paper: &'static str,
+    /// Forms beside the default one.
+    pub variants: &'static [Variant],
+    /// What can be set, with defaults.
+    pub settings: &'static [Setting],
+    /// Prepares the technique for a field.
+    pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
+}
+
+/// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
+/// benchmarks and the reports.
+pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY];
+
+/// The row with this name.
+pub fn find(name: &str) -> Option<&'static Entry> {
+    TECHNIQUES.iter().find(|entry| entry.name == name)
+}

@@ -1,0 +1,101 @@
+//! What can be set on a technique: declared in its room, checked here once, read without failure.
+
+use super::Entry;
+
+/// What a setting may be.
+#[derive(Clone, Copy, Debug)]
+pub enum Values {
+    /// One of these words.
+    Words(&'static [&'static str]),
+    /// A number between these two, inclusive.
+    Number(f64, f64),
+}
+
+/// A setting: `--set key=value`.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Its key.
+    pub key: &'static str,
+    /// What it may be.
+    pub values: Values,
+    /// What it is unless set.
+    pub default: &'static str,
+    /// One line.
+    pub about: &'static str,
+}
+
+/// A variant and values for all settings of one technique.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    variant: Option<&'static str>,
+    values: Vec<(&'static Setting, String)>,
+}
+
+impl Settings {
+    /// The settings of `entry`, `choices` put over the defaults. The error names what is allowed.
+    pub fn new(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Self, String> {
+        let variant = match variant {
+            None => None,
+            Some(name) => Some(entry.variants.iter().find(|v| v.name == name).ok_or_else(|| {
+                let known: Vec<_> = entry.variants.iter().map(|v| v.name).collect();
+                format!("{} has no variant {name}, expected one of: {}", entry.name, known.join(", "))
+            })?),
+        };
+        let mut values: Vec<_> = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
+        for (key, value) in choices {
+            let Some(slot) = values.iter_mut().find(|(s, _)| s.key == key) else {
+                let known: Vec<_> = entry.settings.iter().map(|s| s.key).collect();
+                return Err(format!("{} has no setting {key}, expected one of: {}", entry.name, known.join(", ")));
+            };
+            slot.0.check(value)?;
+            slot.1 = value.clone();
+        }
+        Ok(Self { variant: variant.map(|v| v.name), values })
+    }
+
+    /// The defaults of `entry`.
+    pub fn defaults(entry: &Entry) -> Self {
+        let values = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
+        Self { variant: None, values }
+    }
+
+    /// The variant chosen, if not the default one.
+    pub fn variant(&self) -> Option<&'static str> {
+        self.variant
+    }
+
+    /// The value of a setting as a word.
+    ///
+    /// # Panics
+    /// If the room did not declare the key.
+    pub fn word(&self, key: &str) -> &str {
+        &self.values.iter().find(|(s, _)| s.key == key).expect("a declared key").1
+    }
+
+    /// The value of a setting as a number.
+    ///
+    /// # Panics
+    /// If the room did not declare the key as a number.
+    pub fn number(&self, key: &str) -> f64 {
+        self.word(key).parse().expect("checked on entry")
+    }
+}
+
+impl Setting {
+    fn check(&self, value: &str) -> Result<(), String> {
+        match self.values {
+            Values::Words(words) if words.contains(&value) => Ok(()),
+            Values::Number(low, high) if value.parse().is_ok_and(|v: f64| (low..=high).contains(&v)) => Ok(()),
+            _ => Err(format!("{}={value}: expected {}", self.key, self.values)),
+        }
+    }
+}
+
+impl std::fmt::Display for Values {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Values::Words(words) => write!(f, "{}", words.join("|")),
+            Values::Number(low, high) => write!(f, "{low} to {high}"),
+        }
+    }
+}
