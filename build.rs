@@ -1,1 +1,81 @@
-fn main() {}
+//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`).
+
+#[cfg(feature = "vulkan")]
+#[path = "src/draw/layout.rs"]
+#[allow(dead_code)]
+mod layout;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    #[cfg(feature = "vulkan")]
+    shaders::compile_all();
+}
+
+#[cfg(feature = "vulkan")]
+mod shaders {
+    use std::path::{Path, PathBuf};
+
+    use shaderc::{
+        CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, SpirvVersion, TargetEnv,
+    };
+
+    const STAGES: &[(&str, ShaderKind)] =
+        &[("vert", ShaderKind::Vertex), ("frag", ShaderKind::Fragment), ("comp", ShaderKind::Compute)];
+
+    pub fn compile_all() {
+        println!("cargo:rerun-if-changed=shaders");
+        println!("cargo:rerun-if-changed=src/draw/layout.rs");
+        let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
+        let compiler = Compiler::new().expect("shaderc starts");
+        let mut table = String::from("&[\n");
+        let mut failed = false;
+        let mut sources: Vec<_> = std::fs::read_dir("shaders").expect("shaders/").map(|e| e.unwrap().path()).collect();
+        sources.sort();
+        for path in sources {
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+            let Some((_, kind)) = STAGES.iter().find(|(name, _)| *name == extension) else { continue };
+            let name = path.file_name().expect("a file").to_str().expect("UTF-8").to_string();
+            match compile(&compiler, &path, *kind) {
+                Ok(words) => {
+                    let spirv = out.join(format!("{name}.spv"));
+                    std::fs::write(&spirv, words).expect("OUT_DIR is writable");
+                    table += &format!("    ({name:?}, include_bytes!({:?})),\n", spirv.to_str().expect("UTF-8"));
+                }
+                Err(message) => {
+                    failed = true;
+                    for line in message.lines() {
+                        println!("cargo::error={line}");
+                    }
+                }
+            }
+        }
+        std::fs::write(out.join("shaders.rs"), table + "]\n").expect("OUT_DIR is writable");
+        if failed {
+            std::process::exit(1);
+        }
+    }
+
+    fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind) -> Result<Vec<u8>, String> {
+        let source = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let mut options = CompileOptions::new().map_err(|e| e.to_string())?;
+        options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
+        options.set_target_spirv(SpirvVersion::V1_6);
+        options.set_optimization_level(OptimizationLevel::Performance);
+        // Names of structs and members: the layout test reads them.
+        options.set_generate_debug_info();
+        options.set_warnings_as_errors();
+        options.set_include_callback(|name, _, from, _| {
+            let content = match name {
+                "layout.glsl" => Ok(super::layout::GLSL.to_string()),
+                _ => {
+                    std::fs::read_to_string(Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}"))
+                }
+            };
+            content.map(|content| ResolvedInclude { resolved_name: format!("shaders/{name}"), content })
+        });
+        compiler
+            .compile_into_spirv(&source, kind, &path.to_string_lossy(), "main", Some(&options))
+            .map(|artifact| artifact.as_binary_u8().to_vec())
+            .map_err(|e| e.to_string())
+    }
+}

@@ -7,6 +7,8 @@
 //! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
 //! - [`draw`]: the neck: a frame as plain data.
 //! - [`lod`]: the techniques: from a view to a frame.
+//! - [`plan`]: what a scene needs, and so what is left out.
+//! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 
 pub mod view;
 
@@ -15,3 +17,8 @@ pub mod height;
 pub mod draw;
 
 pub mod lod;
+
+pub mod plan;
+
+#[cfg(feature = "vulkan")]
+pub mod gpu;

@@ -72,9 +72,9 @@ shared! {
         sun: vec3,
         /// Fog: optical density per metre.
         fog_density: float,
-        /// Horizontal size of a pixel at distance 1 m (perspective), in metres; 0 in an orthographic view.
-        pixel_per_metre_inverse: float,
-        /// Horizontal size of a pixel in an orthographic view, metres.
+        /// Size of a pixel at distance 1 m (perspective), metres; 0 in an orthographic view.
+        pixel_slope: float,
+        /// Size of a pixel in an orthographic view, metres; 0 in a perspective one.
         pixel_size: float,
     }
 

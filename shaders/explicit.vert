@@ -1,0 +1,18 @@
+#version 460
+// Vertices that carry their heights, and the heights they morph to.
+#extension GL_GOOGLE_include_directive : require
+#include "frame.glsl"
+#include "position.glsl"
+#include "emit.glsl"
+#include "instance.glsl"
+
+layout(location = 0) in ivec2 in_position;
+layout(location = 1) in float in_height;
+layout(location = 2) in float in_target;
+layout(location = 3) in float in_morph;
+
+void main() {
+    Instance instance = instance_attributes();
+    ivec2 at = lattice_position(instance, in_position);
+    emit_vertex(at, morphed_height(in_height, in_target, in_morph), instance);
+}

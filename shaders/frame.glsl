@@ -1,0 +1,13 @@
+// What every graphics and compute program here is given.
+#extension GL_EXT_scalar_block_layout : require
+#include "layout.glsl"
+
+layout(set = 0, binding = 0, scalar) uniform FrameBlock { Frame frame; };
+// Heights, in layers of pages: metres, or 16-bit codes over 65535.
+layout(set = 0, binding = 1) uniform sampler2DArray height_pages;
+
+// Features of the scene (src/plan.rs); what a scene lacks is not in its pipeline.
+layout(constant_id = 0) const bool CODED = false;
+layout(constant_id = 1) const bool TILED = false;
+// Side of a page as a power of two; 0: one page holds all.
+layout(constant_id = 2) const uint PAGE_SHIFT = 0;

@@ -1,0 +1,12 @@
+// The instance's fields as vertex attributes, in the order of src/draw/layout.rs.
+
+layout(location = 8) in ivec2 in_origin;
+layout(location = 9) in uint in_cells;
+layout(location = 10) in uint in_shift;
+layout(location = 11) in uint in_turns;
+layout(location = 12) in uint in_level;
+layout(location = 13) in uint in_batch;
+
+Instance instance_attributes() {
+    return Instance(in_origin, in_cells, in_shift, in_turns, in_level, in_batch);
+}

@@ -1,0 +1,15 @@
+#version 460
+// Vertices without heights: displaced by the height texture.
+#extension GL_GOOGLE_include_directive : require
+#include "frame.glsl"
+#include "position.glsl"
+#include "emit.glsl"
+#include "instance.glsl"
+
+layout(location = 0) in ivec2 in_position;
+
+void main() {
+    Instance instance = instance_attributes();
+    ivec2 at = lattice_position(instance, in_position);
+    emit_vertex(at, sample_height(at), instance);
+}

@@ -1,0 +1,238 @@
+//! Frames in flight: command buffers, fences, and the queries of each frame, read when its slot comes round.
+
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use ash::vk;
+
+use super::device::Gpu;
+
+/// Frames whose commands may be under way at once. Two: the host records one while the device draws another.
+pub const SLOTS: usize = 2;
+/// Passes that a frame may time.
+const SCOPES: u32 = 16;
+
+/// What the device did in a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// Name and milliseconds of each pass, in order.
+    pub passes: Vec<(&'static str, f64)>,
+    /// Milliseconds from the first pass's start to the last one's end.
+    pub total_ms: f64,
+    /// Vertices run, primitives after clipping, fragments run — of the pass named `terrain`.
+    pub statistics: Option<[u64; 3]>,
+}
+
+/// The slots.
+pub struct Frames {
+    gpu: Arc<Gpu>,
+    slots: Vec<Slot>,
+    next: usize,
+    measured: bool,
+    /// The newest timing read back.
+    pub timing: Timing,
+}
+
+struct Slot {
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    fence: vk::Fence,
+    stamps: vk::QueryPool,
+    statistics: vk::QueryPool,
+    scopes: Vec<&'static str>,
+    has_statistics: bool,
+}
+
+/// A frame being recorded.
+pub struct Recording<'a> {
+    /// The device.
+    pub gpu: &'a Arc<Gpu>,
+    /// The command buffer.
+    pub commands: vk::CommandBuffer,
+    /// The slot's number, below [`SLOTS`].
+    pub slot: usize,
+    state: &'a mut Slot,
+    measured: bool,
+}
+
+impl Frames {
+    /// Slots with queries if `measured`.
+    pub fn new(gpu: &Arc<Gpu>, measured: bool) -> Result<Self> {
+        let measured = measured && gpu.timestamp_ns > 0.0;
+        let slots = (0..SLOTS).map(|_| Slot::new(gpu, measured)).collect::<Result<_>>()?;
+        Ok(Self { gpu: Arc::clone(gpu), slots, next: 0, measured, timing: Timing::default() })
+    }
+
+    /// Waits for the next slot, reads its timing, and starts recording.
+    pub fn begin(&mut self) -> Result<Recording<'_>> {
+        let slot = self.next;
+        self.wait(slot)?;
+        let state = &mut self.slots[slot];
+        state.scopes.clear();
+        state.has_statistics = false;
+        // SAFETY: the slot's fence says its commands have ended.
+        unsafe {
+            self.gpu.raw.reset_command_pool(state.pool, vk::CommandPoolResetFlags::empty())?;
+            if self.measured {
+                self.gpu.raw.reset_query_pool(state.stamps, 0, 2 * SCOPES);
+                if state.statistics != vk::QueryPool::null() {
+                    self.gpu.raw.reset_query_pool(state.statistics, 0, 1);
+                }
+            }
+            let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            self.gpu.raw.begin_command_buffer(state.commands, &info)?;
+        }
+        Ok(Recording { gpu: &self.gpu, commands: state.commands, slot, state, measured: self.measured })
+    }
+
+    /// Ends recording and submits, waiting for and signalling the given semaphores.
+    pub fn submit(&mut self, wait: Option<vk::Semaphore>, signal: Option<vk::Semaphore>) -> Result<()> {
+        let slot = &self.slots[self.next];
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let semaphore = |s: vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage);
+        let waits: Vec<_> = wait.into_iter().map(semaphore).collect();
+        let signals: Vec<_> = signal.into_iter().map(semaphore).collect();
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(slot.commands)];
+        let submit = [vk::SubmitInfo2::default()
+            .command_buffer_infos(&commands)
+            .wait_semaphore_infos(&waits)
+            .signal_semaphore_infos(&signals)];
+        // SAFETY: the command buffer was begun in this slot and nothing else uses the queue.
+        unsafe {
+            self.gpu.raw.end_command_buffer(slot.commands)?;
+            self.gpu.raw.reset_fences(&[slot.fence])?;
+            self.gpu.raw.queue_submit2(self.gpu.queue, &submit, slot.fence).context("submitting a frame")?;
+        }
+        self.next = (self.next + 1) % SLOTS;
+        Ok(())
+    }
+
+    /// Waits for all frames and reads the newest timing.
+    pub fn finish(&mut self) -> Result<()> {
+        for k in 0..SLOTS {
+            self.wait((self.next + k) % SLOTS)?;
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, slot: usize) -> Result<()> {
+        let state = &mut self.slots[slot];
+        // SAFETY: the fence belongs to the slot.
+        unsafe { self.gpu.raw.wait_for_fences(&[state.fence], true, u64::MAX) }.context("waiting for a frame")?;
+        if self.measured && !state.scopes.is_empty() {
+            self.timing = state.timing(&self.gpu)?;
+            state.scopes.clear();
+        }
+        Ok(())
+    }
+}
+
+impl Recording<'_> {
+    /// Records a pass under one name: debug label, timestamps, and, for `terrain`, pipeline statistics.
+    pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let commands = self.commands;
+        self.gpu.begin_label(commands, name);
+        let timed = self.measured && (self.state.scopes.len() as u32) < SCOPES;
+        let first = 2 * self.state.scopes.len() as u32;
+        let counted = timed && name == "terrain" && self.state.statistics != vk::QueryPool::null();
+        // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
+        unsafe {
+            if timed {
+                self.state.scopes.push(name);
+                let stage = vk::PipelineStageFlags2::TOP_OF_PIPE;
+                self.gpu.raw.cmd_write_timestamp2(commands, stage, self.state.stamps, first);
+            }
+            if counted {
+                self.state.has_statistics = true;
+                let flags = vk::QueryControlFlags::empty();
+                self.gpu.raw.cmd_begin_query(commands, self.state.statistics, 0, flags);
+            }
+        }
+        let result = record(self);
+        unsafe {
+            if counted {
+                self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
+            }
+            if timed {
+                let stage = vk::PipelineStageFlags2::BOTTOM_OF_PIPE;
+                self.gpu.raw.cmd_write_timestamp2(commands, stage, self.state.stamps, first + 1);
+            }
+        }
+        self.gpu.end_label(commands);
+        result
+    }
+}
+
+impl Slot {
+    fn new(gpu: &Arc<Gpu>, measured: bool) -> Result<Self> {
+        let query = |kind, count, statistics| {
+            let info =
+                vk::QueryPoolCreateInfo::default().query_type(kind).query_count(count).pipeline_statistics(statistics);
+            // SAFETY: the device is alive.
+            unsafe { gpu.raw.create_query_pool(&info, None) }
+        };
+        let none = vk::QueryPipelineStatisticFlags::empty();
+        let counted = vk::QueryPipelineStatisticFlags::VERTEX_SHADER_INVOCATIONS
+            | vk::QueryPipelineStatisticFlags::CLIPPING_PRIMITIVES
+            | vk::QueryPipelineStatisticFlags::FRAGMENT_SHADER_INVOCATIONS;
+        // SAFETY: the device is alive.
+        unsafe {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);
+            let pool = gpu.raw.create_command_pool(&info, None)?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let commands = gpu.raw.allocate_command_buffers(&info)?[0];
+            gpu.name(commands, "frame");
+            let info = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
+            let fence = gpu.raw.create_fence(&info, None)?;
+            let stamps =
+                if measured { query(vk::QueryType::TIMESTAMP, 2 * SCOPES, none)? } else { vk::QueryPool::null() };
+            let statistics = if measured && gpu.has_statistics {
+                query(vk::QueryType::PIPELINE_STATISTICS, 1, counted)?
+            } else {
+                vk::QueryPool::null()
+            };
+            Ok(Self { pool, commands, fence, stamps, statistics, scopes: Vec::new(), has_statistics: false })
+        }
+    }
+
+    fn timing(&self, gpu: &Gpu) -> Result<Timing> {
+        let mut stamps = vec![0u64; 2 * self.scopes.len()];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: the frame has ended, so the queries it wrote are available.
+        unsafe { gpu.raw.get_query_pool_results(self.stamps, 0, &mut stamps, flags)? };
+        let ms = |from: u64, to: u64| to.wrapping_sub(from) as f64 * gpu.timestamp_ns / 1e6;
+        let passes = self.scopes.iter().zip(stamps.chunks(2)).map(|(name, t)| (*name, ms(t[0], t[1]))).collect();
+        let statistics = if self.has_statistics {
+            let mut counts = [[0u64; 3]];
+            unsafe { gpu.raw.get_query_pool_results(self.statistics, 0, &mut counts, flags)? };
+            Some(counts[0])
+        } else {
+            None
+        };
+        let total_ms = ms(stamps[0], stamps[stamps.len() - 1]);
+        Ok(Timing { passes, total_ms, statistics })
+    }
+}
+
+impl Drop for Frames {
+    fn drop(&mut self) {
+        // SAFETY: the device is idle before anything goes.
+        unsafe {
+            let _ = self.gpu.raw.device_wait_idle();
+            for slot in &self.slots {
+                self.gpu.raw.destroy_query_pool(slot.stamps, None);
+                self.gpu.raw.destroy_query_pool(slot.statistics, None);
+                self.gpu.raw.destroy_fence(slot.fence, None);
+                self.gpu.raw.destroy_command_pool(slot.pool, None);
+            }
+        }
+    }
+}
+
+/// Records commands, submits them and waits: for work before the first frame.
+pub fn once(gpu: &Arc<Gpu>, record: impl FnOnce(&mut Recording) -> Result<()>) -> Result<()> {
+    let mut frames = Frames::new(gpu, false)?;
+    record(&mut frames.begin()?)?;
+    frames.submit(None, None)?;
+    frames.finish()
+}

@@ -1,0 +1,21 @@
+//! Executes draw lists on Vulkan: the only module that names `ash` or says `unsafe`.
+//!
+//! It cannot tell which technique it draws. Offscreen pictures and windows are two targets with the same two
+//! steps. Everything is made at start; nothing is created inside a frame.
+#![allow(unsafe_code)]
+
+pub mod device;
+pub mod frames;
+pub mod instance;
+pub mod memory;
+pub mod pages;
+pub mod pipelines;
+pub mod shaders;
+#[cfg(feature = "viewer")]
+pub mod swapchain;
+pub mod target;
+pub mod terrain;
+pub mod twin;
+
+pub use device::{Choice, Gpu};
+pub use instance::Instance;

@@ -1,0 +1,152 @@
+//! Sampled images: the height pages, the hole mask, and pictures.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+
+use super::device::Gpu;
+use super::frames::once;
+use super::memory::{Buffer, Image, ImageInfo, barriers};
+use crate::height::{Field, Samples};
+use crate::plan::ScenePlan;
+
+/// Bytes staged at once: rows are copied in bands of this size, so that staging stays small beside the field.
+const STAGING: u64 = 32 << 20;
+
+/// The field's heights as an array of pages.
+pub fn heights(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
+    let format = if plan.coded { vk::Format::R16_UNORM } else { vk::Format::R32_SFLOAT };
+    paged(gpu, plan, "heights", format, plan.texel_bytes(), |first, count, row| match field.samples() {
+        Samples::F32(heights) => row.extend_from_slice(bytemuck::cast_slice(&heights[first..first + count])),
+        Samples::Coded { codes, .. } => row.extend_from_slice(bytemuck::cast_slice(&codes[first..first + count])),
+    })
+}
+
+/// One byte a sample, not 0 for holes; a stand-in of one texel if the plan leaves holes out.
+pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
+    if !plan.holes {
+        return picture(gpu, "no holes", vk::Format::R8_UINT, [1, 1], true, &[0]);
+    }
+    paged(gpu, plan, "hole mask", vk::Format::R8_UINT, 1, |first, count, row| {
+        row.extend((first..first + count).map(|k| u8::from(field.holes().contains(k))));
+    })
+}
+
+/// A picture laid over the field; a stand-in of one texel if there is none.
+pub fn overlay(gpu: &Arc<Gpu>, picture_: Option<&image::RgbaImage>) -> Result<Image> {
+    match picture_ {
+        Some(rgba) => picture(gpu, "overlay", vk::Format::R8G8B8A8_SRGB, rgba.dimensions().into(), false, rgba),
+        None => picture(gpu, "no overlay", vk::Format::R8G8B8A8_SRGB, [1, 1], false, &[255; 4]),
+    }
+}
+
+fn picture(
+    gpu: &Arc<Gpu>,
+    purpose: &'static str,
+    format: vk::Format,
+    size: [u32; 2],
+    array: bool,
+    data: &[u8],
+) -> Result<Image> {
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    let image = Image::new(gpu, ImageInfo { purpose, size, layers: array.then_some(1), format, usage })?;
+    let row = data.len() as u64 / u64::from(size[1]);
+    upload(gpu, &image, 1, size, row, |_, y, rows, staging| {
+        staging.extend_from_slice(&data[y as usize * row as usize..(y + rows) as usize * row as usize]);
+    })?;
+    Ok(image)
+}
+
+fn paged(
+    gpu: &Arc<Gpu>,
+    plan: &ScenePlan,
+    purpose: &'static str,
+    format: vk::Format,
+    texel: u64,
+    copy: impl Fn(usize, usize, &mut Vec<u8>),
+) -> Result<Image> {
+    let (size, [columns, rows]) = (plan.page_size(), plan.pages());
+    let layers = columns * rows;
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    let image = Image::new(gpu, ImageInfo { purpose, size, layers: Some(layers), format, usage })?;
+    let stored = plan.stored();
+    upload(gpu, &image, layers, size, u64::from(size[0]) * texel, |layer, y, count, staging| {
+        let corner = [layer % columns * size[0], layer / columns * size[1]];
+        for z in corner[1] + y..corner[1] + y + count {
+            // What sticks out of the field is never read; it repeats the last row and stays short.
+            let z = z.min(stored[1] - 1) as usize;
+            let width = size[0].min(stored[0] - corner[0]) as usize;
+            copy(z * stored[0] as usize + corner[0] as usize, width, staging);
+            staging.resize(staging.len() + (size[0] as usize - width) * texel as usize, 0);
+        }
+    })?;
+    Ok(image)
+}
+
+/// Fills all layers band by band and leaves the image ready for sampling. `fill(layer, first row, rows, out)`
+/// appends the rows' bytes.
+fn upload(
+    gpu: &Arc<Gpu>,
+    image: &Image,
+    layers: u32,
+    size: [u32; 2],
+    row_bytes: u64,
+    fill: impl Fn(u32, u32, u32, &mut Vec<u8>),
+) -> Result<()> {
+    let band = ((STAGING / row_bytes) as u32).clamp(1, size[1]);
+    let mut staging = Buffer::host(gpu, "staging", u64::from(band) * row_bytes, vk::BufferUsageFlags::TRANSFER_SRC)?;
+    use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+    let ready = (Stage::COPY, Access::TRANSFER_WRITE, Layout::TRANSFER_DST_OPTIMAL);
+    once(gpu, |r| {
+        barriers(gpu, r.commands, &[image.barrier((Stage::NONE, Access::NONE, Layout::UNDEFINED), ready)]);
+        Ok(())
+    })?;
+    let mut bytes = Vec::new();
+    for layer in 0..layers {
+        for y in (0..size[1]).step_by(band as usize) {
+            let rows = band.min(size[1] - y);
+            bytes.clear();
+            fill(layer, y, rows, &mut bytes);
+            staging.write(0, &bytes);
+            let region = [vk::BufferImageCopy::default()
+                .image_subresource(
+                    vk::ImageSubresourceLayers::default()
+                        .aspect_mask(vk::ImageAspectFlags::COLOR)
+                        .base_array_layer(layer)
+                        .layer_count(1),
+                )
+                .image_offset(vk::Offset3D { x: 0, y: y as i32, z: 0 })
+                .image_extent(vk::Extent3D { width: size[0], height: rows, depth: 1 })];
+            once(gpu, |r| {
+                // SAFETY: staging and image outlive the wait in `once`.
+                unsafe {
+                    let layout = Layout::TRANSFER_DST_OPTIMAL;
+                    gpu.raw.cmd_copy_buffer_to_image(r.commands, staging.raw, image.raw, layout, &region);
+                }
+                Ok(())
+            })?;
+        }
+    }
+    once(gpu, |r| {
+        let sampled = (Stage::ALL_COMMANDS, Access::SHADER_SAMPLED_READ, Layout::SHADER_READ_ONLY_OPTIMAL);
+        barriers(gpu, r.commands, &[image.barrier(ready, sampled)]);
+        Ok(())
+    })
+}
+
+/// A sampler that filters linearly; coordinates beyond the edge repeat or clamp.
+pub fn sampler(gpu: &Gpu, repeat: bool) -> Result<vk::Sampler> {
+    let mode = if repeat { vk::SamplerAddressMode::REPEAT } else { vk::SamplerAddressMode::CLAMP_TO_EDGE };
+    let info = vk::SamplerCreateInfo::default()
+        .mag_filter(vk::Filter::LINEAR)
+        .min_filter(vk::Filter::LINEAR)
+        .address_mode_u(mode)
+        .address_mode_v(mode)
+        .address_mode_w(mode)
+        .max_lod(vk::LOD_CLAMP_NONE);
+    // SAFETY: the device is alive; the owner destroys the sampler.
+    let sampler = unsafe { gpu.raw.create_sampler(&info, None) }?;
+    gpu.name(sampler, if repeat { "repeating sampler" } else { "clamping sampler" });
+    Ok(sampler)
+}

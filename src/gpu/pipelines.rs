@@ -1,0 +1,256 @@
+//! Pipelines: one per source that occurs, each specialised to the scene plan; and the sky's.
+
+use std::collections::BTreeMap;
+use std::mem::offset_of;
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use ash::vk;
+
+use super::device::Gpu;
+use super::shaders::{self, Constants};
+use super::target::Formats;
+use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex};
+use crate::draw::{Source, Topology};
+use crate::plan::ScenePlan;
+
+/// The pipelines of a scene, and the layout they share.
+pub struct Pipelines {
+    gpu: Arc<Gpu>,
+    /// Set 0: the frame and the scene's images.
+    pub set_layout: vk::DescriptorSetLayout,
+    /// The layout of all.
+    pub layout: vk::PipelineLayout,
+    /// Behind the land.
+    pub sky: vk::Pipeline,
+    terrain: BTreeMap<(Source, Topology), vk::Pipeline>,
+}
+
+impl Pipelines {
+    /// Makes the pipelines for a plan, drawing to these formats.
+    pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, formats: Formats) -> Result<Self> {
+        let image = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
+        let kinds = [vk::DescriptorType::UNIFORM_BUFFER, image, image, image];
+        let bindings: Vec<_> = (0u32..)
+            .zip(kinds)
+            .map(|(binding, kind)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(kind)
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
+            })
+            .collect();
+        // SAFETY: the device is alive; Drop destroys what is made here.
+        let (set_layout, layout) = unsafe {
+            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+            let set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
+            let sets = [set_layout];
+            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+            (set_layout, gpu.raw.create_pipeline_layout(&info, None)?)
+        };
+        gpu.name(layout, "scene");
+        let mut pipelines =
+            Self { gpu: Arc::clone(gpu), set_layout, layout, sky: vk::Pipeline::null(), terrain: BTreeMap::new() };
+        pipelines.sky = pipelines.make_sky(formats)?;
+        for source in [Source::Lattice, Source::Resident] {
+            for topology in [Topology::Triangles, Topology::Strip] {
+                let pipeline = pipelines.make_terrain(plan, formats, source, topology)?;
+                pipelines.terrain.insert((source, topology), pipeline);
+            }
+        }
+        Ok(pipelines)
+    }
+
+    /// The pipeline that draws such draws. Resident and streamed geometry share one.
+    pub fn terrain(&self, source: Source, topology: Topology) -> vk::Pipeline {
+        let source = if source == Source::Streamed { Source::Resident } else { source };
+        self.terrain[&(source, topology)]
+    }
+
+    fn make_terrain(
+        &self,
+        plan: &ScenePlan,
+        formats: Formats,
+        source: Source,
+        topology: Topology,
+    ) -> Result<vk::Pipeline> {
+        let flag = u32::from;
+        let constants = Constants::new(&[
+            flag(plan.coded),
+            flag(plan.tiled),
+            plan.page_shift,
+            flag(plan.holes),
+            flag(plan.fog),
+            plan.colour as u32,
+            flag(plan.filtered),
+        ]);
+        let (vertex, stride, attributes) = vertex_input(source);
+        let bindings = [
+            vk::VertexInputBindingDescription::default().binding(0).stride(stride),
+            vk::VertexInputBindingDescription::default()
+                .binding(1)
+                .stride(size_of::<Instance>() as u32)
+                .input_rate(vk::VertexInputRate::INSTANCE),
+        ];
+        self.make(Description {
+            name: if source == Source::Lattice { "lattice" } else { "explicit" },
+            vertex,
+            fragment: "terrain.frag",
+            constants: &constants,
+            input: vk::PipelineVertexInputStateCreateInfo::default()
+                .vertex_binding_descriptions(&bindings)
+                .vertex_attribute_descriptions(&attributes),
+            topology: match topology {
+                Topology::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
+                Topology::Strip => vk::PrimitiveTopology::TRIANGLE_STRIP,
+            },
+            wireframe: plan.wireframe,
+            // Land is drawn first and hides; the far plane lies at depth 0.
+            depth: (true, vk::CompareOp::GREATER),
+            cull: vk::CullModeFlags::BACK,
+            formats,
+        })
+    }
+
+    fn make_sky(&self, formats: Formats) -> Result<vk::Pipeline> {
+        self.make(Description {
+            name: "sky",
+            vertex: "sky.vert",
+            fragment: "sky.frag",
+            constants: &Constants::new(&[]),
+            input: vk::PipelineVertexInputStateCreateInfo::default(),
+            topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            wireframe: false,
+            // Only where nothing was drawn.
+            depth: (false, vk::CompareOp::EQUAL),
+            cull: vk::CullModeFlags::NONE,
+            formats,
+        })
+    }
+
+    fn make(&self, d: Description) -> Result<vk::Pipeline> {
+        let gpu = &self.gpu;
+        let (vertex, fragment) = (shaders::module(gpu, d.vertex)?, shaders::module(gpu, d.fragment)?);
+        let special = d.constants.info();
+        let stage = |stage, module| {
+            vk::PipelineShaderStageCreateInfo::default()
+                .stage(stage)
+                .module(module)
+                .name(c"main")
+                .specialization_info(&special)
+        };
+        let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), stage(vk::ShaderStageFlags::FRAGMENT, fragment)];
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(d.topology);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let polygon = if d.wireframe { vk::PolygonMode::LINE } else { vk::PolygonMode::FILL };
+        let raster = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(polygon)
+            .cull_mode(d.cull)
+            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+            .line_width(1.0);
+        let samples =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(true)
+            .depth_write_enable(d.depth.0)
+            .depth_compare_op(d.depth.1);
+        let blend = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
+        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+        let colours = [d.formats.colour];
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .color_attachment_formats(&colours)
+            .depth_attachment_format(d.formats.depth);
+        let info = vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&d.input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&samples)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(self.layout)
+            .push_next(&mut rendering);
+        // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
+        let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        unsafe {
+            gpu.raw.destroy_shader_module(vertex, None);
+            gpu.raw.destroy_shader_module(fragment, None);
+        }
+        let pipeline = made.map_err(|(_, e)| e).with_context(|| format!("pipeline {}", d.name))?[0];
+        gpu.name(pipeline, d.name);
+        Ok(pipeline)
+    }
+}
+
+/// What distinguishes one pipeline from another.
+struct Description<'a> {
+    name: &'static str,
+    vertex: &'static str,
+    fragment: &'static str,
+    constants: &'a Constants,
+    input: vk::PipelineVertexInputStateCreateInfo<'a>,
+    topology: vk::PrimitiveTopology,
+    wireframe: bool,
+    depth: (bool, vk::CompareOp),
+    cull: vk::CullModeFlags,
+    formats: Formats,
+}
+
+/// Vertex program, vertex stride and attributes of a source.
+fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttributeDescription>) {
+    let attribute = |binding: u32| {
+        move |(location, format, offset): (u32, vk::Format, usize)| vk::VertexInputAttributeDescription {
+            location,
+            binding,
+            format,
+            offset: offset as u32,
+        }
+    };
+    const PAIR: vk::Format = vk::Format::R32G32_SINT;
+    const UINT: vk::Format = vk::Format::R32_UINT;
+    const FLOAT: vk::Format = vk::Format::R32_SFLOAT;
+    let (shader, stride, vertex) = match source {
+        Source::Lattice => {
+            ("lattice.vert", size_of::<LatticeVertex>(), vec![(0, PAIR, offset_of!(LatticeVertex, position))])
+        }
+        Source::Resident | Source::Streamed => (
+            "explicit.vert",
+            size_of::<ExplicitVertex>(),
+            vec![
+                (0, PAIR, offset_of!(ExplicitVertex, position)),
+                (1, FLOAT, offset_of!(ExplicitVertex, height)),
+                (2, FLOAT, offset_of!(ExplicitVertex, target)),
+                (3, FLOAT, offset_of!(ExplicitVertex, morph)),
+            ],
+        ),
+    };
+    let instance = [
+        (8, PAIR, offset_of!(Instance, origin)),
+        (9, UINT, offset_of!(Instance, cells)),
+        (10, UINT, offset_of!(Instance, shift)),
+        (11, UINT, offset_of!(Instance, turns)),
+        (12, UINT, offset_of!(Instance, level)),
+        (13, UINT, offset_of!(Instance, batch)),
+    ];
+    let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
+    (shader, stride as u32, attributes)
+}
+
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        // SAFETY: owners wait for the device before they drop their pipelines.
+        unsafe {
+            for pipeline in self.terrain.values() {
+                self.gpu.raw.destroy_pipeline(*pipeline, None);
+            }
+            self.gpu.raw.destroy_pipeline(self.sky, None);
+            self.gpu.raw.destroy_pipeline_layout(self.layout, None);
+            self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! The compiled shaders.
+
+use anyhow::{Context, Result};
+use ash::vk;
+
+use super::device::Gpu;
+
+/// File name of the source and SPIR-V of every shader (made by build.rs).
+pub const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// The SPIR-V words of a shader.
+///
+/// # Panics
+/// If there is no such shader: the names are constants of this module's callers.
+pub fn words(name: &str) -> Vec<u32> {
+    let (_, bytes) = SHADERS.iter().find(|(n, _)| *n == name).expect("a shader of this program");
+    bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect()
+}
+
+/// Makes a shader module; the caller destroys it once its pipelines are made.
+pub fn module(gpu: &Gpu, name: &str) -> Result<vk::ShaderModule> {
+    let words = words(name);
+    let info = vk::ShaderModuleCreateInfo::default().code(&words);
+    // SAFETY: the words are SPIR-V from our own compiler.
+    let module = unsafe { gpu.raw.create_shader_module(&info, None) }.with_context(|| format!("shader {name}"))?;
+    gpu.name(module, name);
+    Ok(module)
+}
+
+/// Bytes and map of specialization constants, ids counting from 0, four bytes each.
+pub struct Constants {
+    data: Vec<u8>,
+    entries: Vec<vk::SpecializationMapEntry>,
+}
+
+impl Constants {
+    /// Constants with these values, in the order of their ids.
+    pub fn new(values: &[u32]) -> Self {
+        let entry = |k: u32| vk::SpecializationMapEntry { constant_id: k, offset: 4 * k, size: 4 };
+        Self {
+            data: values.iter().flat_map(|v| v.to_ne_bytes()).collect(),
+            entries: (0..values.len() as u32).map(entry).collect(),
+        }
+    }
+
+    /// The description for a pipeline stage.
+    pub fn info(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default().data(&self.data).map_entries(&self.entries)
+    }
+}

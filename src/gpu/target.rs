@@ -1,0 +1,175 @@
+//! Where frames are drawn: attachments that a frame begins and ends, and the offscreen picture read back.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+
+use super::device::Gpu;
+use super::frames::Recording;
+use super::memory::{Buffer, Image, ImageInfo, barriers, image_barrier, memory_barrier};
+
+/// Formats of the attachments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Formats {
+    /// Colour.
+    pub colour: vk::Format,
+    /// Depth: 32-bit float, reversed.
+    pub depth: vk::Format,
+}
+
+/// Depth: 32-bit float, cleared to 0, the far plane.
+pub const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+
+/// A colour attachment to draw into, whoever owns it.
+#[derive(Clone, Copy)]
+pub struct Attachment {
+    /// The image.
+    pub image: vk::Image,
+    /// Its view.
+    pub view: vk::ImageView,
+    /// Its format.
+    pub format: vk::Format,
+    /// Pixels.
+    pub size: [u32; 2],
+}
+
+/// A depth image of the size of a target.
+pub fn depth_image(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Image> {
+    let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+    Image::new(gpu, ImageInfo { purpose: "depth", size, layers: None, format: DEPTH, usage })
+}
+
+/// Begins drawing into an attachment, cleared to alpha 0 (no land) and the far plane.
+pub fn begin(recording: &Recording, colour: Attachment, depth: &Image) {
+    use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+    let gpu = recording.gpu;
+    let commands = recording.commands;
+    let colour_write =
+        (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
+    let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
+    let depth_access = Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
+    barriers(
+        gpu,
+        commands,
+        &[
+            image_barrier(
+                colour.image,
+                colour.format,
+                // After the picture's last use: presented, or copied out.
+                (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED),
+                colour_write,
+            ),
+            depth.barrier(
+                (tests, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
+                (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
+            ),
+        ],
+    );
+    let clear = vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } };
+    let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
+    let colours = [vk::RenderingAttachmentInfo::default()
+        .image_view(colour.view)
+        .image_layout(Layout::COLOR_ATTACHMENT_OPTIMAL)
+        .load_op(vk::AttachmentLoadOp::CLEAR)
+        .store_op(vk::AttachmentStoreOp::STORE)
+        .clear_value(clear)];
+    let depth = vk::RenderingAttachmentInfo::default()
+        .image_view(depth.view)
+        .image_layout(Layout::DEPTH_ATTACHMENT_OPTIMAL)
+        .load_op(vk::AttachmentLoadOp::CLEAR)
+        .store_op(vk::AttachmentStoreOp::DONT_CARE)
+        .clear_value(far);
+    let [width, height] = colour.size;
+    let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+    let info = vk::RenderingInfo::default()
+        .render_area(area)
+        .layer_count(1)
+        .color_attachments(&colours)
+        .depth_attachment(&depth);
+    let viewport = [vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() }];
+    // SAFETY: the command buffer is being recorded; the attachments live until the frame has ended.
+    unsafe {
+        gpu.raw.cmd_begin_rendering(commands, &info);
+        gpu.raw.cmd_set_viewport(commands, 0, &viewport);
+        gpu.raw.cmd_set_scissor(commands, 0, &[area]);
+    }
+}
+
+/// Ends drawing.
+pub fn end(recording: &Recording) {
+    // SAFETY: `begin` was recorded in the same command buffer.
+    unsafe { recording.gpu.raw.cmd_end_rendering(recording.commands) };
+}
+
+/// A picture in memory.
+pub struct Offscreen {
+    colour: Image,
+    /// Its depth image.
+    pub depth: Image,
+    readback: Buffer,
+}
+
+impl Offscreen {
+    /// A picture of this size, or which limit it exceeds.
+    pub fn new(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Self> {
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
+        let info = ImageInfo { purpose: "colour", size, layers: None, format: Self::FORMATS.colour, usage };
+        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+        Ok(Self {
+            colour: Image::new(gpu, info)?,
+            depth: depth_image(gpu, size)?,
+            readback: Buffer::new(
+                gpu,
+                "read-back",
+                bytes,
+                vk::BufferUsageFlags::TRANSFER_DST,
+                MemoryLocation::GpuToCpu,
+            )?,
+        })
+    }
+
+    /// The formats of every offscreen picture.
+    pub const FORMATS: Formats = Formats { colour: vk::Format::R8G8B8A8_SRGB, depth: DEPTH };
+
+    /// The attachment to draw into.
+    pub fn attachment(&self) -> Attachment {
+        let Image { raw, view, size, format, .. } = self.colour;
+        Attachment { image: raw, view, format, size }
+    }
+
+    /// Records the copy to the host, after [`end`].
+    pub fn read_back(&self, recording: &Recording) {
+        use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+        let gpu = recording.gpu;
+        let written =
+            (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
+        let copied = (Stage::COPY, Access::TRANSFER_READ, Layout::TRANSFER_SRC_OPTIMAL);
+        barriers(gpu, recording.commands, &[self.colour.barrier(written, copied)]);
+        let [width, height] = self.colour.size;
+        let region = [vk::BufferImageCopy::default()
+            .image_subresource(
+                vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1),
+            )
+            .image_extent(vk::Extent3D { width, height, depth: 1 })];
+        // SAFETY: the command buffer is being recorded; image and buffer live until the frame has ended.
+        unsafe {
+            let layout = Layout::TRANSFER_SRC_OPTIMAL;
+            gpu.raw.cmd_copy_image_to_buffer(recording.commands, self.colour.raw, layout, self.readback.raw, &region);
+        }
+        memory_barrier(
+            gpu,
+            recording.commands,
+            (Stage::COPY, Access::TRANSFER_WRITE),
+            (Stage::HOST, Access::HOST_READ),
+        );
+    }
+
+    /// The picture read back last (after the frame has finished); alpha says where land was drawn.
+    pub fn picture(&self) -> image::RgbaImage {
+        let [width, height] = self.colour.size;
+        let bytes = &self.readback.read()[..4 * width as usize * height as usize];
+        image::RgbaImage::from_raw(width, height, bytes.to_vec()).expect("as many bytes as pixels")
+    }
+}

@@ -1,0 +1,315 @@
+//! The executor: a scene's resources, and draw lists turned into commands.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use ash::vk;
+use bytemuck::cast_slice;
+
+use super::device::Gpu;
+use super::frames::{Recording, SLOTS, once};
+use super::memory::{Buffer, Image, memory_barrier};
+use super::pages;
+use super::pipelines::Pipelines;
+use super::target::Formats;
+use crate::draw::layout::{ExplicitVertex, Frame, Instance};
+use crate::draw::{Draw, DrawList, Geometry, Limits, Source, Submission, Upload};
+use crate::height::Field;
+use crate::plan::ScenePlan;
+
+/// Everything on the device that one scene and one technique need.
+pub struct Terrain {
+    gpu: Arc<Gpu>,
+    pipelines: Pipelines,
+    limits: Limits,
+    resident: Resident,
+    slots: Vec<Slot>,
+    descriptors: vk::DescriptorPool,
+    samplers: [vk::Sampler; 2],
+    _images: [Image; 3],
+}
+
+/// Geometry that stays.
+struct Resident {
+    lattice: Buffer,
+    vertices: Buffer,
+    indices: Buffer,
+}
+
+/// What one frame in flight writes.
+struct Slot {
+    set: vk::DescriptorSet,
+    frame: Buffer,
+    instances: Buffer,
+    commands: Buffer,
+    vertices: Buffer,
+    indices: Buffer,
+    staging: Buffer,
+}
+
+const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
+
+impl Terrain {
+    /// Makes the resources of a scene for a technique whose lists keep `limits`.
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        plan: &ScenePlan,
+        field: &Field,
+        overlay: Option<&image::RgbaImage>,
+        resident: &Geometry,
+        limits: Limits,
+        formats: Formats,
+    ) -> Result<Self> {
+        let pipelines = Pipelines::new(gpu, plan, formats)?;
+        let images =
+            [pages::heights(gpu, plan, field)?, pages::holes(gpu, plan, field)?, pages::overlay(gpu, overlay)?];
+        let samplers = [pages::sampler(gpu, plan.tiled)?, pages::sampler(gpu, false)?];
+        let descriptors = descriptor_pool(gpu)?;
+        let layouts = [pipelines.set_layout; SLOTS];
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&layouts);
+        // SAFETY: the pool holds as many sets as there are slots.
+        let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
+        let slots = sets.into_iter().map(|set| Slot::new(gpu, set, &limits)).collect::<Result<Vec<_>>>()?;
+        for slot in &slots {
+            slot.describe(gpu, &images, samplers);
+        }
+        let resident = Resident::new(gpu, resident)?;
+        Ok(Self { gpu: Arc::clone(gpu), pipelines, limits, resident, slots, descriptors, samplers, _images: images })
+    }
+
+    /// Writes a frame's data and records its uploads: before the target begins.
+    ///
+    /// # Panics
+    /// If the list exceeds the limits that its technique stated.
+    pub fn prepare(&mut self, recording: &mut Recording, frame: &Frame, list: &DrawList) -> Result<()> {
+        assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
+        let slot = &mut self.slots[recording.slot];
+        slot.frame.write(0, bytemuck::bytes_of(frame));
+        slot.instances.write(0, cast_slice(&list.instances));
+        slot.vertices.write(0, cast_slice(&list.streamed.vertices));
+        slot.indices.write(0, cast_slice(&list.streamed.indices));
+        for (k, draw) in list.draws.iter().enumerate() {
+            slot.commands.write(k * COMMAND, &command_bytes(draw));
+        }
+        if list.uploads.is_empty() {
+            return Ok(());
+        }
+        recording.scope("upload", |r| {
+            self.upload(r, &list.uploads);
+            Ok(())
+        })
+    }
+
+    fn upload(&mut self, recording: &Recording, uploads: &[Upload]) {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let read = (Stage::VERTEX_INPUT, Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ);
+        let write = (Stage::COPY, Access::TRANSFER_WRITE);
+        // Earlier frames may still read what is overwritten.
+        memory_barrier(&self.gpu, recording.commands, read, write);
+        let staging = &mut self.slots[recording.slot].staging;
+        let mut at = 0;
+        for upload in uploads {
+            let (bytes, target, offset): (&[u8], _, _) = match upload {
+                Upload::Vertices(first, v) => {
+                    (cast_slice(v), &self.resident.vertices, *first as usize * size_of::<ExplicitVertex>())
+                }
+                Upload::Indices(first, i) => (cast_slice(i), &self.resident.indices, *first as usize * 4),
+            };
+            if bytes.is_empty() {
+                continue;
+            }
+            staging.write(at, bytes);
+            let region =
+                [vk::BufferCopy { src_offset: at as u64, dst_offset: offset as u64, size: bytes.len() as u64 }];
+            // SAFETY: both buffers live until the frame has ended.
+            unsafe { self.gpu.raw.cmd_copy_buffer(recording.commands, staging.raw, target.raw, &region) };
+            at += bytes.len();
+        }
+        memory_barrier(&self.gpu, recording.commands, write, read);
+    }
+
+    /// Records the land and then the sky: between the target's begin and end.
+    pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
+        recording.scope("terrain", |r| {
+            self.bind_scene(r);
+            let mut first = 0;
+            let kind = |d: &Draw| (d.source, d.topology);
+            for run in list.draws.chunk_by(|a, b| kind(a) == kind(b)) {
+                self.bind_geometry(r, run[0].source);
+                // SAFETY: the pipeline outlives the frame.
+                unsafe {
+                    let pipeline = self.pipelines.terrain(run[0].source, run[0].topology);
+                    self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
+                }
+                self.submit(r, list.submission, first, run);
+                first += run.len();
+            }
+            Ok(())
+        })?;
+        recording.scope("sky", |r| {
+            // SAFETY: the pipeline outlives the frame; three vertices without input.
+            unsafe {
+                self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, self.pipelines.sky);
+                self.bind_scene(r);
+                self.gpu.raw.cmd_draw(r.commands, 3, 1, 0, 0);
+            }
+            Ok(())
+        })
+    }
+
+    fn submit(&self, r: &Recording, submission: Submission, first: usize, run: &[Draw]) {
+        let raw = &self.gpu.raw;
+        match submission {
+            Submission::Indirect => {
+                let most = self.gpu.limits.max_draw_indirect_count as usize;
+                for (k, part) in run.chunks(most).enumerate() {
+                    let offset = ((first + k * most) * COMMAND) as u64;
+                    let commands = self.slots[r.slot].commands.raw;
+                    // SAFETY: the slot's buffer holds these commands until the frame has ended.
+                    unsafe {
+                        raw.cmd_draw_indexed_indirect(r.commands, commands, offset, part.len() as u32, COMMAND as u32);
+                    }
+                }
+            }
+            Submission::Direct => {
+                for draw in run {
+                    let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
+                    // SAFETY: ranges lie in the bound buffers.
+                    unsafe {
+                        let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
+                        raw.cmd_draw_indexed(r.commands, indices, instances, first_index, 0, first_instance);
+                    }
+                }
+            }
+        }
+    }
+
+    fn bind_scene(&self, r: &Recording) {
+        let (sets, layout) = ([self.slots[r.slot].set], self.pipelines.layout);
+        // SAFETY: the set was written when the slot was made.
+        unsafe {
+            let graphics = vk::PipelineBindPoint::GRAPHICS;
+            self.gpu.raw.cmd_bind_descriptor_sets(r.commands, graphics, layout, 0, &sets, &[]);
+        }
+    }
+
+    fn bind_geometry(&self, r: &Recording, source: Source) {
+        let slot = &self.slots[r.slot];
+        let (vertices, indices) = match source {
+            Source::Lattice => (&self.resident.lattice, &self.resident.indices),
+            Source::Resident => (&self.resident.vertices, &self.resident.indices),
+            Source::Streamed => (&slot.vertices, &slot.indices),
+        };
+        // SAFETY: the buffers live until the frame has ended.
+        unsafe {
+            let buffers = [vertices.raw, slot.instances.raw];
+            self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0, 0]);
+            self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, vk::IndexType::UINT32);
+        }
+    }
+}
+
+fn command_bytes(draw: &Draw) -> [u8; COMMAND] {
+    let words = [
+        draw.indices.len() as u32,
+        draw.instances.len() as u32,
+        draw.indices.start,
+        0, // vertex offset
+        draw.instances.start,
+    ];
+    bytemuck::cast(words)
+}
+
+impl Resident {
+    fn new(gpu: &Arc<Gpu>, geometry: &Geometry) -> Result<Self> {
+        let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
+        let index = vk::BufferUsageFlags::INDEX_BUFFER;
+        Ok(Self {
+            lattice: filled(gpu, "lattice vertices", cast_slice(&geometry.lattice), vertex)?,
+            vertices: filled(gpu, "resident vertices", cast_slice(&geometry.vertices), vertex)?,
+            indices: filled(gpu, "resident indices", cast_slice(&geometry.indices), index)?,
+        })
+    }
+}
+
+/// A device-local buffer with this content.
+fn filled(gpu: &Arc<Gpu>, purpose: &'static str, data: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer> {
+    let buffer = Buffer::device(gpu, purpose, data.len() as u64, usage)?;
+    if data.is_empty() {
+        return Ok(buffer);
+    }
+    let mut staging = Buffer::host(gpu, "staging", data.len() as u64, vk::BufferUsageFlags::TRANSFER_SRC)?;
+    staging.write(0, data);
+    once(gpu, |r| {
+        let region = [vk::BufferCopy { size: data.len() as u64, ..Default::default() }];
+        // SAFETY: both buffers outlive the wait in `once`.
+        unsafe { gpu.raw.cmd_copy_buffer(r.commands, staging.raw, buffer.raw, &region) };
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let read = (Stage::VERTEX_INPUT, Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ);
+        memory_barrier(gpu, r.commands, (Stage::COPY, Access::TRANSFER_WRITE), read);
+        Ok(())
+    })?;
+    Ok(buffer)
+}
+
+impl Slot {
+    fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSet, limits: &Limits) -> Result<Self> {
+        use vk::BufferUsageFlags as Usage;
+        let host = |purpose, bytes: usize, usage| Buffer::host(gpu, purpose, bytes as u64, usage);
+        Ok(Self {
+            set,
+            frame: host("frame", size_of::<Frame>(), Usage::UNIFORM_BUFFER)?,
+            instances: host("instances", limits.instances * size_of::<Instance>(), Usage::VERTEX_BUFFER)?,
+            commands: host("indirect commands", limits.draws * COMMAND, Usage::INDIRECT_BUFFER)?,
+            vertices: host("streamed vertices", limits.vertices * size_of::<ExplicitVertex>(), Usage::VERTEX_BUFFER)?,
+            indices: host("streamed indices", limits.indices * 4, Usage::INDEX_BUFFER)?,
+            staging: host("upload staging", limits.upload_bytes, Usage::TRANSFER_SRC)?,
+        })
+    }
+
+    fn describe(&self, gpu: &Gpu, images: &[Image; 3], [heights, clamping]: [vk::Sampler; 2]) {
+        let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
+        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+        let sampled = [heights, clamping, clamping];
+        let infos: Vec<_> = images
+            .iter()
+            .zip(sampled)
+            .map(|(image, sampler)| [vk::DescriptorImageInfo { sampler, image_view: image.view, image_layout: layout }])
+            .collect();
+        let write = vk::WriteDescriptorSet::default().dst_set(self.set);
+        let mut writes =
+            vec![write.dst_binding(0).descriptor_type(vk::DescriptorType::UNIFORM_BUFFER).buffer_info(&frame)];
+        for (binding, info) in (1u32..).zip(&infos) {
+            let kind = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
+            writes.push(write.dst_binding(binding).descriptor_type(kind).image_info(info));
+        }
+        // SAFETY: buffer and images live as long as the set.
+        unsafe { gpu.raw.update_descriptor_sets(&writes, &[]) };
+    }
+}
+
+fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
+    let slots = SLOTS as u32;
+    let sizes = [
+        vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
+        vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 3 * slots },
+    ];
+    let info = vk::DescriptorPoolCreateInfo::default().max_sets(slots).pool_sizes(&sizes);
+    // SAFETY: the device is alive; Drop destroys the pool.
+    let pool = unsafe { gpu.raw.create_descriptor_pool(&info, None) }?;
+    gpu.name(pool, "scene");
+    Ok(pool)
+}
+
+impl Drop for Terrain {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in use once the device is idle.
+        unsafe {
+            let _ = self.gpu.raw.device_wait_idle();
+            self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
+            for sampler in self.samplers {
+                self.gpu.raw.destroy_sampler(sampler, None);
+            }
+        }
+    }
+}
