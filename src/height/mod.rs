@@ -1,5 +1,9 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+pub mod demo;
+pub mod save;
+pub mod synth;
+
 use glam::DVec3;
 
 /// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.
