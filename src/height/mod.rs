@@ -1,7 +1,10 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+pub mod demo;
 pub mod rtin;
+pub mod save;
 pub mod surface;
+pub mod synth;
 
 use glam::DVec3;
 

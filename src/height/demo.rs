@@ -1,0 +1,30 @@
+//! The terrain that comes with the program: alpine land of 25.6 × 25.6 km, made by [`super::synth`].
+//!
+//! `cargo test --release --no-default-features -- --ignored make_assets` makes both files anew, byte for byte.
+
+use super::synth::Kind;
+use super::{Field, Holes, Samples};
+
+/// What [`demo`] was synthesised as.
+pub const KIND: Kind = Kind::Eroded;
+/// See [`KIND`].
+pub const SIZE: [u32; 2] = [1025, 1025];
+/// See [`KIND`].
+pub const SEED: u64 = 1;
+/// Metres per code of the picture.
+pub const SCALE: f32 = 0.1;
+/// Distance of samples, metres.
+pub const SPACING: f64 = 25.0;
+
+/// The colours of the land, north up, edge samples in the centres of edge pixels' outer sides: a JPEG picture.
+pub const OVERLAY: &[u8] = include_bytes!("../../assets/demo_overlay.jpg");
+
+/// The field.
+pub fn demo() -> Field {
+    let picture = include_bytes!("../../assets/demo.png");
+    let picture = image::load_from_memory(picture).expect("the embedded picture is whole").into_luma16();
+    let size = [picture.width(), picture.height()];
+    let codes = picture.into_raw();
+    let holes = Holes::none(codes.len());
+    Field::new(Samples::Coded { codes, zero: 0.0, scale: SCALE }, size, [SPACING; 2], holes)
+}

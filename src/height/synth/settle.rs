@@ -1,0 +1,84 @@
+//! What ice, soil and rubble do to land cut by rivers: troughs with flat floors, rounded lowlands, plains and lakes.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::eroded::Rock;
+use super::flow::{Flow, Grid};
+use super::noise;
+
+/// Half width of a trough over √(area drained).
+const WIDTH: f64 = 0.055;
+/// A trough's walls end at so many half widths.
+const WALLS: f64 = 1.6;
+/// Slope of a plain of rubble.
+const PLAIN: f64 = 0.004;
+
+/// Widens the valleys, rounds the slopes, then lets the land sag twice: what sank first is filled with rubble, what
+/// sank last with water.
+pub fn settle(rock: &Rock, grid: Grid, height: &mut Vec<f64>) {
+    widen(rock, grid, height);
+    (0..6).for_each(|_| creep(grid, height));
+    sag(rock, grid, height, 400.0, rock.seed ^ 0x60);
+    *height = Flow::new(grid, height, PLAIN).level;
+    (0..2).for_each(|_| creep(grid, height));
+    sag(rock, grid, height, 150.0, rock.seed ^ 0x70);
+    *height = Flow::new(grid, height, 0.0).level;
+}
+
+/// Lets the land near a large river down towards it, as glaciers did: the larger the river, the wider. The river that
+/// is nearest in half widths rules a cell; the search spreads from the rivers as Dijkstra's does.
+fn widen(rock: &Rock, grid: Grid, height: &mut [f64]) {
+    let area = Flow::new(grid, height, 0.0).area(grid);
+    let half_width = |k: usize| {
+        let [x, z] = rock.place(grid, k, 1100.0);
+        WIDTH * area[k].sqrt() * (1.0 + 0.6 * noise::gradient(x, z, rock.seed ^ 0x50))
+    };
+    let mut nearest = vec![(f64::INFINITY, 0); grid.len()];
+    let mut front = BinaryHeap::new();
+    for k in (0..grid.len()).filter(|&k| half_width(k) > 2.0 * grid.spacing) {
+        nearest[k] = (0.0, k);
+        front.push((Reverse(0), k));
+    }
+    while let Some((Reverse(bits), k)) = front.pop() {
+        let (away, river) = nearest[k];
+        if away.to_bits() != bits {
+            continue;
+        }
+        let half_width = half_width(river);
+        for (n, _) in grid.neighbours(k) {
+            let away = grid.distance(n, river) / half_width;
+            if away < nearest[n].0.min(WALLS) {
+                nearest[n] = (away, river);
+                // Bits of a non-negative number order as it does.
+                front.push((Reverse(away.to_bits()), n));
+            }
+        }
+    }
+    let old = height.to_vec();
+    for (k, &(away, river)) in nearest.iter().enumerate().filter(|(_, (away, _))| *away < WALLS) {
+        let t = ((away - 0.5) / (WALLS - 0.5)).clamp(0.0, 1.0);
+        let keep = 0.02 + 0.98 * t * t * (3.0 - 2.0 * t);
+        height[k] = old[k].min(old[river] + (old[k] - old[river]) * keep);
+    }
+}
+
+/// Soil creep, dh/dt ∝ ∇²h, by a nine-point stencil; little of it where rock is bare.
+fn creep(grid: Grid, height: &mut [f64]) {
+    const BARE: f64 = 1300.0;
+    let old = height.to_vec();
+    let w = grid.size[0];
+    for k in (0..grid.len()).filter(|&k| !grid.is_border(k)) {
+        let straight = old[k - 1] + old[k + 1] + old[k - w] + old[k + w];
+        let diagonal = old[k - w - 1] + old[k - w + 1] + old[k + w - 1] + old[k + w + 1];
+        let soil = 1.0 - (old[k] / BARE).clamp(0.0, 0.8);
+        height[k] += 0.6 * soil * ((4.0 * straight + diagonal) / 20.0 - old[k]);
+    }
+}
+
+/// Lowers the land in wide basins of up to `depth` metres.
+fn sag(rock: &Rock, grid: Grid, height: &mut [f64], depth: f64, seed: u64) {
+    for (k, h) in height.iter_mut().enumerate() {
+        *h -= depth * noise::fractal(rock.place(grid, k, 9_000.0), 2, seed).max(0.0);
+    }
+}
