@@ -7,6 +7,7 @@
 //! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
 //! - [`draw`]: the neck: a frame as plain data.
 //! - [`lod`]: the techniques: from a view to a frame.
+//! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 
 pub mod view;
 
@@ -15,3 +16,5 @@ pub mod height;
 pub mod draw;
 
 pub mod lod;
+
+pub mod measure;
