@@ -9,6 +9,8 @@
 //! - [`lod`]: the techniques: from a view to a frame.
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
+//! - [`measure`]: numbers from triangles and pictures: errors, proofs.
+//! - [`cli`]: the program.
 
 pub mod view;
 
@@ -22,3 +24,7 @@ pub mod plan;
 
 #[cfg(feature = "vulkan")]
 pub mod gpu;
+
+pub mod measure;
+
+pub mod cli;

@@ -26,9 +26,7 @@ pub fn visit_triangles(
     mut visit: impl FnMut(&Drawn),
 ) {
     for draw in &list.draws {
-        for instance in draw.instances.clone() {
-            visit_draw(field, frame, resident, list, draw, instance, &mut visit);
-        }
+        visit_draw(field, frame, resident, list, draw, &mut visit);
     }
 }
 
@@ -39,7 +37,21 @@ pub fn triangles(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawL
     drawn
 }
 
-fn visit_draw(
+/// Calls `visit` for every triangle of one draw, or part of a draw, of the list.
+pub fn visit_draw(
+    field: &Field,
+    frame: &Frame,
+    resident: &Geometry,
+    list: &DrawList,
+    draw: &Draw,
+    visit: &mut impl FnMut(&Drawn),
+) {
+    for instance in draw.instances.clone() {
+        visit_instance(field, frame, resident, list, draw, instance, visit);
+    }
+}
+
+fn visit_instance(
     field: &Field,
     frame: &Frame,
     resident: &Geometry,

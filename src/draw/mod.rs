@@ -111,6 +111,33 @@ impl Topology {
     }
 }
 
+impl Draw {
+    /// The same triangles in the same order as several draws of at most `triangles` (or one instance's
+    /// indices cut there): pieces of work for those who walk them in parallel.
+    pub fn parts(&self, triangles: usize) -> Vec<Draw> {
+        let own = self.topology.triangles(self.indices.len());
+        if own == 0 {
+            return Vec::new();
+        }
+        let instances = self.instances.clone().step_by((triangles / own).max(1)).flat_map(|first| {
+            let last = first.saturating_add((triangles / own).max(1) as u32).min(self.instances.end);
+            self.index_parts(triangles).into_iter().map(move |indices| (indices, first..last))
+        });
+        instances.map(|(indices, instances)| Draw { indices, instances, ..self.clone() }).collect()
+    }
+
+    fn index_parts(&self, triangles: usize) -> Vec<Range<u32>> {
+        // A strip is cut after an even number of triangles, so that the winding goes on as it was.
+        let (step, shared) = match self.topology {
+            Topology::Triangles => (3 * triangles.max(1), 0),
+            Topology::Strip => (2 * triangles.div_ceil(2).max(1), 2),
+        };
+        let Range { start, end } = self.indices;
+        let starts = (start..end - shared).step_by(step);
+        starts.map(|first| first..first.saturating_add(step as u32 + shared).min(end)).collect()
+    }
+}
+
 impl DrawList {
     /// Empties the list and keeps its memory.
     pub fn clear(&mut self) {
@@ -152,5 +179,36 @@ impl Limits {
             && size.vertices <= self.vertices
             && size.indices <= self.indices
             && size.upload_bytes <= self.upload_bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Instance, first index of a triangle, and whether a strip turns it over.
+    fn triangles(draw: &Draw) -> Vec<(u32, u32, bool)> {
+        let own = draw.topology.triangles(draw.indices.len()) as u32;
+        let triangle = |draw: &Draw, k: u32| match draw.topology {
+            Topology::Triangles => (draw.indices.start + 3 * k, false),
+            Topology::Strip => (draw.indices.start + k, k % 2 == 1),
+        };
+        let of_instance = |i| (0..own).map(move |k| triangle(draw, k)).map(move |(first, over)| (i, first, over));
+        draw.instances.clone().flat_map(of_instance).collect()
+    }
+
+    #[test]
+    fn parts_are_the_whole_in_order() {
+        for topology in [Topology::Triangles, Topology::Strip] {
+            for count in [0, 3, 30, 33, 300] {
+                let draw = Draw { source: Source::Lattice, topology, indices: 7..7 + count, instances: 2..11 };
+                for size in [1, 2, 7, 16, 40, 1000] {
+                    let parts = draw.parts(size);
+                    let joined: Vec<_> = parts.iter().flat_map(triangles).collect();
+                    assert_eq!(joined, triangles(&draw), "{topology:?}, {count} indices by {size}");
+                    assert!(parts.iter().all(|p| triangles(p).len() <= size.next_multiple_of(2)));
+                }
+            }
+        }
     }
 }

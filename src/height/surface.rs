@@ -1,7 +1,7 @@
 //! Surfaces over the lattice: triangles whose corners lie on samples' positions, and how far they are from
 //! the samples inside them.
 
-use super::Field;
+use super::{Field, rtin};
 
 /// A corner of a drawn triangle: lattice position (finest samples) and height, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +56,17 @@ pub fn visit_samples(triangle: &Triangle, mut visit: impl FnMut(u32, u32, f64)) 
             visit(x as u32, z as u32, y);
         }
     }
+}
+
+/// Whether a triangle of the samples' own surface has data at its three corners.
+pub fn is_land(field: &Field, triangle: &[[i32; 2]; 3]) -> bool {
+    triangle.iter().all(|&[x, z]| !field.is_hole(x as u32, z as u32))
+}
+
+/// Whether there is a triangle with data between two lattice positions, both inclusive.
+pub fn has_land(field: &Field, first: [i32; 2], last: [i32; 2]) -> bool {
+    let mut cells = (first[1]..last[1]).flat_map(|j| (first[0]..last[0]).map(move |i| (i, j)));
+    field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).iter().any(|t| is_land(field, t)))
 }
 
 /// The largest vertical distance, metres, of an up-facing triangle from the field's samples inside it,

@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use super::mesh;
+use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle};
-use crate::height::{Field, rtin};
 use crate::view::{Aabb, Containment, Frustum};
 
 /// All blocks of a field, and the quadtree over them.
@@ -151,10 +151,7 @@ impl Block<'_> {
                 (low, high) = (low.min(y), high.max(y));
             }
         }
-        let known = |t: [[i32; 2]; 3]| t.iter().all(|&[x, z]| !self.field.is_hole(x as u32, z as u32));
-        let mut cells = (first[1]..last[1]).flat_map(|j| (first[0]..last[0]).map(move |i| (i, j)));
-        let land = self.field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).into_iter().any(known));
-        land.then_some([low, high])
+        surface::has_land(self.field, first, last).then_some([low, high])
     }
 
     /// ε by level, saturated.

@@ -1,0 +1,77 @@
+//! Edges of triangles: which are shared, which make the border, and whether the border is clean.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::{CounterExample, Kind, refuted};
+use crate::draw::expand::Drawn;
+
+/// An edge of a triangle that no other triangle uses the other way round. The land is to the left of it, seen
+/// from above with north up: an edge that runs south has it to the east.
+#[derive(Clone, Copy, Debug)]
+pub struct BorderEdge {
+    /// Where it starts.
+    pub from: [i32; 2],
+    /// Where it ends.
+    pub to: [i32; 2],
+    /// Its triangle.
+    pub triangle: u32,
+}
+
+/// An edge for sorting: both directions come together.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Edge {
+    ends: [[i32; 2]; 2],
+    backward: bool,
+    triangle: u32,
+}
+
+/// The edges without a partner. Refuted if a directed edge occurs twice.
+pub fn border(triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
+    let mut edges: Vec<Edge> = (0u32..).zip(triangles).flat_map(|(k, t)| edges_of(k, t)).collect();
+    edges.par_sort_unstable();
+    let mut border = Vec::new();
+    for uses in edges.chunk_by(|a, b| a.ends == b.ends) {
+        match uses {
+            [only] => {
+                let [low, high] = only.ends;
+                let (from, to) = if only.backward { (high, low) } else { (low, high) };
+                border.push(BorderEdge { from, to, triangle: only.triangle });
+            }
+            [forth, back] if forth.backward != back.backward => {}
+            _ => {
+                let twice = if uses[0].backward == uses[1].backward { &uses[..2] } else { &uses[1..3] };
+                let text = format!("edge {:?} used {} times", uses[0].ends, uses.len());
+                return refuted(Kind::Overlap, triangles, twice.iter().map(|e| e.triangle), text);
+            }
+        }
+    }
+    Ok(border)
+}
+
+fn edges_of(k: u32, triangle: &Drawn) -> [Edge; 3] {
+    let [a, b, c] = triangle.corners.map(|corner| [corner.x, corner.z]);
+    [(a, b), (b, c), (c, a)].map(|(p, q)| Edge { ends: [p.min(q), p.max(q)], backward: p > q, triangle: k })
+}
+
+/// Refuted if an end of a border edge lies strictly inside another border edge.
+pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), Box<CounterExample>> {
+    let ends: HashMap<_, _> = border.iter().flat_map(|e| [(e.from, e.triangle), (e.to, e.triangle)]).collect();
+    for edge in border {
+        let along = [0, 1].map(|k| edge.to[k] - edge.from[k]);
+        let steps = gcd(along[0].unsigned_abs(), along[1].unsigned_abs()) as i32;
+        for step in 1..steps {
+            let inner = [0, 1].map(|k| edge.from[k] + along[k] / steps * step);
+            if let Some(&other) = ends.get(&inner) {
+                let text = format!("vertex {inner:?} inside edge {:?} {:?}", edge.from, edge.to);
+                return refuted(Kind::TJunction, triangles, [edge.triangle, other], text);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}

@@ -1,0 +1,155 @@
+//! Proof that the drawn triangles are one surface, on the integer lattice, without rounding; or the triangles
+//! that refute it.
+//!
+//! In plan, let m be the number of triangles over a point. The steps of [`prove`], each exact:
+//!
+//! 1. every corner lies on the field, and every triangle faces up;
+//! 2. every lattice vertex has one height, to the bit, in all triangles around it;
+//! 3. every directed edge occurs once. An edge used in both directions joins two triangles, and m is the same
+//!    on both sides of it; the others make up the border;
+//! 4. no vertex of the border lies strictly inside an edge of the border: no T-junction. By 2 to 4 triangles
+//!    that touch along a line share whole edges with the same ends in space: no crack;
+//! 5. m is 0 outside the field and changes across the border only. A sweep over the rows follows the border
+//!    and shows that m is 0 or 1 everywhere: covered once, and the drawn area is the covered area;
+//! 6. where m is 0, every triangle of the samples' own surface that has data is outside the frustum: nothing
+//!    in sight is left out. The test is [`Frustum::contains`] on the triangle's own box, so that whoever culls
+//!    by boxes around the land passes, and nobody passes who culls what can be seen.
+//!
+//! What lies along a culled region or a hole is thus no matter of the border's shape but of what is missing
+//! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
+
+mod edges;
+mod sweep;
+
+use std::io::{self, Write};
+
+use rayon::prelude::*;
+
+use crate::draw::expand::Drawn;
+use crate::height::Field;
+use crate::height::surface::{Corner, Triangle, doubled_area};
+use crate::view::Frustum;
+
+/// What is wrong with a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// A corner lies outside the field.
+    Outside,
+    /// A triangle faces down.
+    Fold,
+    /// One vertex has two heights.
+    Crack,
+    /// Land is covered more than once.
+    Overlap,
+    /// A vertex of one triangle lies inside an edge of another.
+    TJunction,
+    /// Land with data, perhaps in sight, is not covered.
+    Gap,
+}
+
+/// The fewest triangles that show what is wrong.
+#[derive(Clone, Debug)]
+pub struct CounterExample {
+    /// What is wrong.
+    pub kind: Kind,
+    /// The triangles at fault; for a gap the one that is missing.
+    pub triangles: Vec<Triangle>,
+    /// What is wrong with them, and where.
+    pub text: String,
+}
+
+impl std::fmt::Display for CounterExample {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:?}: {}", self.kind, self.text)?;
+        self.triangles.iter().try_for_each(|[a, b, c]| {
+            write!(f, "; ({}, {}, {}) ({}, {}, {}) ({}, {}, {})", a.x, a.z, a.y, b.x, b.z, b.y, c.x, c.z, c.y)
+        })
+    }
+}
+
+impl std::error::Error for CounterExample {}
+
+/// What was proven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Proof {
+    /// Triangles.
+    pub triangles: usize,
+    /// Twice the land covered, in samples².
+    pub doubled_area: i64,
+    /// Edges with a triangle on one side only.
+    pub border_edges: usize,
+}
+
+/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 200 bytes a triangle
+/// while it runs.
+pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Proof, Box<CounterExample>> {
+    on_the_field(field, triangles)?;
+    faces_up(triangles)?;
+    one_height_a_vertex(triangles)?;
+    let border = edges::border(triangles)?;
+    edges::no_t_junction(triangles, &border)?;
+    let strips = sweep::strips(triangles, &border)?;
+    sweep::no_gap(field, frustum, &strips)?;
+    let doubled_area = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
+    Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
+}
+
+/// A refutation by some of the triangles.
+fn refuted<T>(
+    kind: Kind,
+    triangles: &[Drawn],
+    guilty: impl IntoIterator<Item = u32>,
+    text: String,
+) -> Result<T, Box<CounterExample>> {
+    let guilty: Vec<&Drawn> = guilty.into_iter().map(|k| &triangles[k as usize]).collect();
+    let instances: Vec<_> = guilty.iter().map(|t| t.instance.to_string()).collect();
+    let text = format!("{text} (instances {})", instances.join(", "));
+    Err(Box::new(CounterExample { kind, triangles: guilty.iter().map(|t| t.corners).collect(), text }))
+}
+
+fn on_the_field(field: &Field, triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
+    let [w, h] = field.size().map(|n| n as i32);
+    let outside = |c: &Corner| !(0..w).contains(&c.x) || !(0..h).contains(&c.z);
+    match triangles.iter().position(|t| t.corners.iter().any(outside)) {
+        Some(k) => refuted(Kind::Outside, triangles, [k as u32], format!("a corner outside {w} × {h} samples")),
+        None => Ok(()),
+    }
+}
+
+fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
+    match triangles.iter().position(|t| doubled_area(&t.corners) <= 0) {
+        Some(k) => refuted(Kind::Fold, triangles, [k as u32], "a triangle that does not face up".into()),
+        None => Ok(()),
+    }
+}
+
+fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
+    let mut vertices: Vec<([i32; 2], u32, u32)> = (0u32..)
+        .zip(triangles)
+        .flat_map(|(k, t)| t.corners.map(|corner| ([corner.x, corner.z], corner.y.to_bits(), k)))
+        .collect();
+    vertices.par_sort_unstable();
+    match vertices.windows(2).find(|v| v[0].0 == v[1].0 && v[0].1 != v[1].1) {
+        Some(&[([x, z], low, a), (_, high, b)]) => {
+            let [low, high] = [low, high].map(f32::from_bits);
+            refuted(Kind::Crack, triangles, [a, b], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes triangles as ASCII PLY, world metres.
+pub fn write_ply(field: &Field, triangles: &[Triangle], mut out: impl Write) -> io::Result<()> {
+    writeln!(out, "ply\nformat ascii 1.0\ncomment metres: x east, y up, z south")?;
+    writeln!(out, "element vertex {}", 3 * triangles.len())?;
+    writeln!(out, "property double x\nproperty double y\nproperty double z")?;
+    writeln!(out, "element face {}\nproperty list uchar uint vertex_indices\nend_header", triangles.len())?;
+    for corner in triangles.iter().flatten() {
+        let p = field.world_at(corner.x.into(), corner.z.into(), corner.y.into());
+        writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
+    }
+    (0..triangles.len()).try_for_each(|k| writeln!(out, "3 {} {} {}", 3 * k, 3 * k + 1, 3 * k + 2))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,172 @@
+//! A sweep from north to south over the bands between two rows of samples. No vertex lies inside a band: there
+//! the border is a row of straight lines that cut the covered land into trapezoids.
+
+use std::cmp::Ordering;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::edges::BorderEdge;
+use super::{CounterExample, Kind, refuted};
+use crate::draw::expand::Drawn;
+use crate::height::surface::{Corner, is_land};
+use crate::height::{Field, rtin};
+use crate::view::{Aabb, Containment, Frustum};
+
+/// Part of the covered land: what lies in a band between two lines.
+#[derive(Clone, Copy, Debug)]
+pub struct Strip {
+    /// The band between rows `band` and `band + 1`.
+    pub band: i32,
+    west: Line,
+    east: Line,
+}
+
+/// Where a line meets the band's northern and southern row.
+type Line = [Fraction; 2];
+
+/// An exact number.
+#[derive(Clone, Copy, Debug)]
+struct Fraction {
+    numerator: i64,
+    /// Positive.
+    denominator: i64,
+}
+
+impl Fraction {
+    fn floor(self) -> i64 {
+        self.numerator.div_euclid(self.denominator)
+    }
+
+    fn ceil(self) -> i64 {
+        -(-self.numerator).div_euclid(self.denominator)
+    }
+}
+
+impl From<i32> for Fraction {
+    fn from(n: i32) -> Self {
+        Self { numerator: n.into(), denominator: 1 }
+    }
+}
+
+impl Ord for Fraction {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let product = |a: &Self, b: &Self| i128::from(a.numerator) * i128::from(b.denominator);
+        product(self, other).cmp(&product(other, self))
+    }
+}
+
+impl PartialOrd for Fraction {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Fraction {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Fraction {}
+
+/// A border edge in a band.
+#[derive(Clone, Copy)]
+struct Crossing {
+    band: i32,
+    line: Line,
+    /// Whether the land begins east of it.
+    enters: bool,
+    triangle: u32,
+}
+
+/// Cuts the land inside the border into strips, sorted by band and from west to east. Refuted if any of it is
+/// covered twice: border lines that cross, or two that enter in a row.
+pub fn strips(triangles: &[Drawn], border: &[BorderEdge]) -> Result<Vec<Strip>, Box<CounterExample>> {
+    let mut crossings: Vec<Crossing> = border.iter().flat_map(crossings).collect();
+    crossings.par_sort_unstable_by_key(|c| (c.band, c.line, !c.enters, c.triangle));
+    let mut strips = Vec::with_capacity(crossings.len() / 2);
+    let refute = |a: &Crossing, b: &Crossing| {
+        let text = format!("land covered twice between rows {} and {}", a.band, a.band + 1);
+        refuted(Kind::Overlap, triangles, [a.triangle, b.triangle], text)
+    };
+    for crossings in crossings.chunk_by(|a, b| a.band == b.band) {
+        if let Some([a, b]) = crossings.array_windows().find(|[a, b]| a.line[1] > b.line[1]) {
+            return refute(a, b);
+        }
+        for pair in crossings.chunks(2) {
+            match pair {
+                [west, east] if west.enters && !east.enters => {
+                    strips.push(Strip { band: west.band, west: west.line, east: east.line });
+                }
+                _ => return refute(&pair[0], &pair[pair.len() - 1]),
+            }
+        }
+    }
+    Ok(strips)
+}
+
+/// The border edge band by band; none if it runs along a row.
+fn crossings(edge: &BorderEdge) -> impl Iterator<Item = Crossing> + use<> {
+    let &BorderEdge { from, to, triangle } = edge;
+    let (north, south) = if from[1] < to[1] { (from, to) } else { (to, from) };
+    let denominator = i64::from(south[1] - north[1]);
+    let at = move |z: i32| Fraction {
+        numerator: i64::from(north[0]) * denominator + i64::from(south[0] - north[0]) * i64::from(z - north[1]),
+        denominator,
+    };
+    let enters = from[1] < to[1];
+    (north[1]..south[1]).map(move |band| Crossing { band, line: [at(band), at(band + 1)], enters, triangle })
+}
+
+/// Refuted if land with data that may be in sight is not covered.
+pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), Box<CounterExample>> {
+    let bands = 0..field.size()[1] as i32 - 1;
+    let missing = bands.into_par_iter().find_map_first(|band| {
+        let first = strips.partition_point(|s| s.band < band);
+        let strips = &strips[first..first + strips[first..].partition_point(|s| s.band == band)];
+        open_cells(field, strips).find_map(|i| {
+            let shows = |t: &[[i32; 2]; 3]| {
+                is_land(field, t) && !strips.iter().any(|s| s.contains(t)) && may_be_seen(field, frustum, t)
+            };
+            rtin::cell(i, band).into_iter().find(shows)
+        })
+    });
+    let Some(triangle) = missing else { return Ok(()) };
+    let text = format!("land at {triangle:?} is neither covered nor out of sight");
+    let corners = triangle.map(|[x, z]| Corner { x, z, y: field.height(x as u32, z as u32) });
+    Err(Box::new(CounterExample { kind: Kind::Gap, triangles: vec![corners], text }))
+}
+
+/// Cells of a band that are not wholly inside one of its strips.
+fn open_cells(field: &Field, strips: &[Strip]) -> impl Iterator<Item = i32> {
+    let last = field.size()[0] as i32 - 1;
+    let ends = strips.iter().map(Strip::whole_cells).chain([(last, last)]);
+    ends.scan(0, |next, (first, end)| {
+        let open = *next..first;
+        *next = end.max(*next);
+        Some(open)
+    })
+    .flatten()
+}
+
+impl Strip {
+    /// The cells `first..end` that lie wholly inside.
+    fn whole_cells(&self) -> (i32, i32) {
+        let [west, east] = [self.west[0].max(self.west[1]).ceil(), self.east[0].min(self.east[1]).floor()];
+        (west as i32, east.max(west) as i32)
+    }
+
+    /// Whether a triangle with corners on the two rows lies inside: its corners do, as strips are convex.
+    fn contains(&self, triangle: &[[i32; 2]; 3]) -> bool {
+        triangle.iter().all(|&[x, z]| {
+            let row = (z - self.band) as usize;
+            self.west[row] <= x.into() && self.east[row] >= x.into()
+        })
+    }
+}
+
+fn may_be_seen(field: &Field, frustum: &Frustum, triangle: &[[i32; 2]; 3]) -> bool {
+    let [a, b, c]: [DVec3; 3] = triangle.map(|[x, z]| field.world(x as u32, z as u32));
+    frustum.contains(&Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }) != Containment::Outside
+}

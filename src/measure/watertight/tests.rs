@@ -1,0 +1,136 @@
+//! Surfaces with one planted fault each.
+
+use super::*;
+use crate::height::{Holes, Samples, rtin};
+use crate::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+
+const SIDE: u32 = 9;
+
+fn field(holes: &[usize]) -> Field {
+    let count = (SIDE * SIDE) as usize;
+    let mut missing = Holes::none(count);
+    holes.iter().for_each(|&k| missing.insert(k));
+    let heights = (0..count).map(|k| (k % 5) as f32).collect();
+    Field::new(Samples::F32(heights), [SIDE, SIDE], [1.0, 1.0], missing)
+}
+
+/// A square of land, `width` metres, seen from above.
+fn above(x: f64, z: f64, width: f64) -> Frustum {
+    let view = View {
+        eye: DVec3::new(x, 100.0, z),
+        world_from_eye: View::turned(-90.0, -90.0, 0.0),
+        lens: Lens::Orthographic { width, far: 1e3 },
+        size: [100, 100],
+        near: 1.0,
+        tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+    };
+    view.frustum()
+}
+
+fn everything() -> Frustum {
+    above(4.0, 4.0, 100.0)
+}
+
+fn drawn(field: &Field, triangle: [[i32; 2]; 3]) -> Drawn {
+    let corners = triangle.map(|[x, z]| Corner { x, z, y: field.height(x as u32, z as u32) });
+    Drawn { corners, instance: 0 }
+}
+
+fn samples_surface(field: &Field) -> Vec<Drawn> {
+    let last = SIDE as i32 - 1;
+    let cells = (0..last).flat_map(|j| (0..last).map(move |i| (i, j)));
+    cells.flat_map(|(i, j)| rtin::cell(i, j)).map(|t| drawn(field, t)).collect()
+}
+
+fn fault(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Kind {
+    prove(field, frustum, triangles).unwrap_err().kind
+}
+
+#[test]
+fn the_samples_own_surface_is_proven() {
+    let field = field(&[]);
+    let proof = prove(&field, &everything(), &samples_surface(&field)).unwrap();
+    assert_eq!(proof, Proof { triangles: 128, doubled_area: 128, border_edges: 32 });
+}
+
+#[test]
+fn a_flipped_triangle_is_a_fold() {
+    let field = field(&[]);
+    let mut triangles = samples_surface(&field);
+    triangles[50].corners.swap(0, 1);
+    assert_eq!(fault(&field, &everything(), &triangles), Kind::Fold);
+}
+
+#[test]
+fn one_ulp_is_a_crack() {
+    let field = field(&[]);
+    let mut triangles = samples_surface(&field);
+    let y = &mut triangles[50].corners[2].y;
+    *y = y.next_up();
+    assert_eq!(fault(&field, &everything(), &triangles), Kind::Crack);
+}
+
+#[test]
+fn a_doubled_triangle_overlaps() {
+    let field = field(&[]);
+    let mut triangles = samples_surface(&field);
+    triangles.push(triangles[50]);
+    assert_eq!(fault(&field, &everything(), &triangles), Kind::Overlap);
+}
+
+/// Two triangles that cross without sharing a vertex or a row.
+#[test]
+fn crossing_triangles_overlap() {
+    let field = field(&[]);
+    let mut triangles = vec![drawn(&field, [[1, 1], [2, 8], [4, 1]]), drawn(&field, [[0, 2], [3, 5], [8, 4]])];
+    let nothing = above(1e6, 0.0, 1.0);
+    assert_eq!(fault(&field, &nothing, &triangles), Kind::Overlap);
+    // The second inside the first, touching nothing.
+    triangles = vec![drawn(&field, [[0, 0], [0, 8], [8, 0]]), drawn(&field, [[1, 1], [1, 2], [2, 1]])];
+    assert_eq!(fault(&field, &nothing, &triangles), Kind::Overlap);
+    triangles.pop();
+    prove(&field, &nothing, &triangles).unwrap();
+}
+
+#[test]
+fn a_halved_neighbour_is_a_t_junction() {
+    let field = field(&[]);
+    let triangles = [[[0, 0], [0, 8], [8, 0]], [[8, 0], [4, 4], [8, 8]], [[8, 8], [4, 4], [0, 8]]];
+    let triangles = triangles.map(|t| drawn(&field, t));
+    assert_eq!(fault(&field, &everything(), &triangles), Kind::TJunction);
+}
+
+#[test]
+fn missing_land_is_a_gap_if_it_may_be_seen_and_has_data() {
+    let whole = field(&[]);
+    let mut triangles = samples_surface(&whole);
+    // Cell (4, 3): both its triangles.
+    triangles.drain(2 * (3 * 8 + 4)..2 * (3 * 8 + 5));
+    assert_eq!(fault(&whole, &everything(), &triangles), Kind::Gap);
+    assert_eq!(fault(&whole, &above(4.5, 3.5, 0.5), &triangles), Kind::Gap);
+    let proof = prove(&whole, &above(1.5, 1.5, 1.0), &triangles).unwrap();
+    assert_eq!((proof.doubled_area, proof.border_edges), (126, 36));
+    // One corner without data at each of the cell's triangles: its diagonal's end.
+    let holed = field(&[3 * 9 + 5]);
+    prove(&holed, &everything(), &triangles).unwrap();
+    let other = field(&[3 * 9 + 4]);
+    assert_eq!(fault(&other, &everything(), &triangles), Kind::Gap);
+}
+
+#[test]
+fn corners_outside_are_found() {
+    let field = field(&[]);
+    let mut triangles = samples_surface(&field);
+    triangles[0].corners[0].x = -1;
+    assert_eq!(fault(&field, &everything(), &triangles), Kind::Outside);
+}
+
+#[test]
+fn ply_has_the_triangles() {
+    let field = field(&[]);
+    let mut text = Vec::new();
+    write_ply(&field, &[samples_surface(&field)[3].corners], &mut text).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    assert!(text.contains("element vertex 3\n") && text.ends_with("\n3 0 1 2\n"), "{text}");
+}
