@@ -146,7 +146,12 @@ impl View {
         let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
         let right = DVec3::new(-sin_yaw, 0.0, cos_yaw);
         let back = -DVec3::new(cos_yaw * cos_pitch, sin_pitch, sin_yaw * cos_pitch);
-        DMat3::from_cols(right, back.cross(right), back) * DMat3::from_rotation_z(-roll.to_radians())
+        DMat3::from_cols(right, back.cross(right), back) * Self::rolled(roll)
+    }
+
+    /// A roll of the eye about its axis, clockwise, degrees.
+    pub fn rolled(roll: f64) -> DMat3 {
+        DMat3::from_rotation_z(-roll.to_radians())
     }
 
     /// Unit vector the eye looks along.

@@ -155,6 +155,26 @@ impl DrawList {
         self.draws.iter().map(|d| d.topology.triangles(d.indices.len()) as u64 * d.instances.len() as u64).sum()
     }
 
+    /// Draw calls that the host records for the list: one for each run of draws of one source and topology, or
+    /// one for each draw.
+    pub fn commands(&self) -> usize {
+        match self.submission {
+            Submission::Direct => self.draws.len(),
+            Submission::Indirect => self.draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)).count(),
+        }
+    }
+
+    /// Instances by level of detail, from the finest.
+    pub fn levels(&self) -> Vec<usize> {
+        let mut counts = Vec::new();
+        for instance in &self.instances {
+            let level = instance.level as usize;
+            counts.resize(counts.len().max(level + 1), 0);
+            counts[level] += 1;
+        }
+        counts
+    }
+
     /// What the list holds, in the terms of [`Limits`].
     pub fn size(&self) -> Limits {
         let bytes = |upload: &Upload| match upload {

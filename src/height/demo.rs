@@ -19,10 +19,12 @@ pub const SPACING: f64 = 25.0;
 /// The colours of the land, north up, edge samples in the centres of edge pixels' outer sides: a JPEG picture.
 pub const OVERLAY: &[u8] = include_bytes!("../../assets/demo_overlay.jpg");
 
+/// The heights as 16-bit codes: a grey PNG picture.
+pub const PICTURE: &[u8] = include_bytes!("../../assets/demo.png");
+
 /// The field.
 pub fn demo() -> Field {
-    let picture = include_bytes!("../../assets/demo.png");
-    let picture = image::load_from_memory(picture).expect("the embedded picture is whole").into_luma16();
+    let picture = image::load_from_memory(PICTURE).expect("the embedded picture is whole").into_luma16();
     let size = [picture.width(), picture.height()];
     let codes = picture.into_raw();
     let holes = Holes::none(codes.len());

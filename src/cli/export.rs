@@ -1,0 +1,183 @@
+//! `cuesta export`: the as-drawn mesh of one view, in world metres.
+
+use std::collections::HashMap;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use glam::DVec3;
+use serde::Serialize;
+use serde_json::json;
+
+use super::scene::{TechniqueArgs, TerrainArgs, ViewArgs};
+use super::{Common, Outcome, report};
+use crate::draw::layout::Frame;
+use crate::draw::{DrawList, expand};
+use crate::height::surface::Corner;
+use crate::height::{Error, Field, surface};
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct ExportArgs {
+    /// Where heights come from.
+    #[command(flatten)]
+    pub terrain: TerrainArgs,
+    /// Where to: .ply, .obj or .glb.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// The view.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// The technique.
+    #[command(flatten)]
+    pub technique: TechniqueArgs,
+}
+
+#[derive(Serialize)]
+struct Exported {
+    triangles: usize,
+    vertices: usize,
+}
+
+/// Vertices in world metres, and triangles of them.
+struct Mesh {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
+    let write = match args.output.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("ply") => write_ply,
+        Some("obj") => write_obj,
+        Some("glb") => write_glb,
+        _ => {
+            let file = args.output.display().to_string();
+            return Err(Error::new(file, "extension", "expected .ply, .obj or .glb").into());
+        }
+    };
+    let field = Arc::new(args.terrain.load(common)?.field);
+    let view = args.view.build(&field, args.technique.tolerance()?)?;
+    let mut technique = args.technique.build(common, &field)?;
+    let mut list = DrawList::default();
+    technique.select(&view, &mut list);
+    let mut mesh = MeshBuilder::new(&field);
+    let frame = Frame::placing(&field, &view);
+    expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));
+    let mesh = mesh.mesh;
+    save(&args.output, &mesh, write)?;
+    report::print(common, &Exported { triangles: mesh.triangles.len(), vertices: mesh.positions.len() })?;
+    Ok(Outcome::Done)
+}
+
+/// Writes beside the target and renames, so that a failure leaves no half a file.
+fn save(path: &Path, mesh: &Mesh, write: fn(&Mesh, &mut dyn Write) -> Result<()>) -> Result<()> {
+    let name = path.display().to_string();
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::new(&name, "file", e))?;
+    let mut out = BufWriter::new(file);
+    write(mesh, &mut out).with_context(|| name.clone())?;
+    let file = out.into_inner().map_err(|e| Error::new(&name, "file", e.error()))?;
+    file.persist(path).map_err(|e| Error::new(&name, "file", e.error))?;
+    Ok(())
+}
+
+/// Collects triangles and shares their vertices.
+struct MeshBuilder<'a> {
+    field: &'a Field,
+    known: HashMap<(i32, i32, u32), u32>,
+    mesh: Mesh,
+}
+
+impl<'a> MeshBuilder<'a> {
+    fn new(field: &'a Field) -> Self {
+        Self { field, known: HashMap::new(), mesh: Mesh { positions: Vec::new(), triangles: Vec::new() } }
+    }
+
+    fn add(&mut self, corners: &surface::Triangle) {
+        let triangle = corners.map(|corner| self.vertex(&corner));
+        self.mesh.triangles.push(triangle);
+    }
+
+    fn vertex(&mut self, corner: &Corner) -> u32 {
+        let positions = &mut self.mesh.positions;
+        *self.known.entry((corner.x, corner.z, corner.y.to_bits())).or_insert_with(|| {
+            positions.push(self.field.world_at(f64::from(corner.x), f64::from(corner.z), f64::from(corner.y)));
+            positions.len() as u32 - 1
+        })
+    }
+}
+
+fn write_ply(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+    writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment x east, y up, z south; world metres")?;
+    writeln!(out, "element vertex {}", mesh.positions.len())?;
+    writeln!(out, "property double x\nproperty double y\nproperty double z")?;
+    writeln!(out, "element face {}", mesh.triangles.len())?;
+    writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
+    for position in &mesh.positions {
+        for value in position.to_array() {
+            out.write_all(&value.to_le_bytes())?;
+        }
+    }
+    for triangle in &mesh.triangles {
+        out.write_all(&[3])?;
+        for index in triangle {
+            out.write_all(&index.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+fn write_obj(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+    writeln!(out, "# x east, y up, z south; world metres")?;
+    for p in &mesh.positions {
+        writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+    }
+    for [a, b, c] in mesh.triangles.iter().map(|t| t.map(|k| k + 1)) {
+        writeln!(out, "f {a} {b} {c}")?;
+    }
+    Ok(())
+}
+
+/// glTF holds positions in f32: they are relative to a node whose translation is in f64.
+fn write_glb(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+    let low = mesh.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
+    let high = mesh.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
+    let relative: Vec<[f32; 3]> = mesh.positions.iter().map(|p| (*p - low).as_vec3().to_array()).collect();
+    let positions: &[u8] = bytemuck::cast_slice(&relative);
+    let indices: &[u8] = bytemuck::cast_slice(&mesh.triangles);
+    let document = json!({
+        "asset": { "version": "2.0", "generator": "cuesta" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0, "translation": low.to_array() }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+        "buffers": [{ "byteLength": positions.len() + indices.len() }],
+        "bufferViews": [
+            { "buffer": 0, "byteOffset": 0, "byteLength": positions.len(), "target": 34962 },
+            { "buffer": 0, "byteOffset": positions.len(), "byteLength": indices.len(), "target": 34963 },
+        ],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": relative.len(), "type": "VEC3",
+              "min": [0.0, 0.0, 0.0], "max": (high - low).as_vec3().to_array() },
+            { "bufferView": 1, "componentType": 5125, "count": 3 * mesh.triangles.len(), "type": "SCALAR" },
+        ],
+    });
+    let mut text = serde_json::to_vec(&document)?;
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let total = 12 + 8 + text.len() + 8 + positions.len() + indices.len();
+    let word = |value: usize| u32::try_from(value).context("a GLB file holds at most 4 GiB");
+    out.write_all(b"glTF")?;
+    for value in [2, word(total)?, word(text.len())?] {
+        out.write_all(&value.to_le_bytes())?;
+    }
+    out.write_all(b"JSON")?;
+    out.write_all(&text)?;
+    out.write_all(&word(positions.len() + indices.len())?.to_le_bytes())?;
+    out.write_all(b"BIN\0")?;
+    out.write_all(positions)?;
+    out.write_all(indices)?;
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! `cuesta info`: what was read; the scene plan; the devices.
+
+use anyhow::{Result, bail};
+use clap::Args;
+use serde::Serialize;
+
+use super::scene::{LookArgs, TechniqueArgs, TerrainArgs};
+use super::{Common, Outcome, report};
+use crate::height::load::Loaded;
+use crate::plan::{Decision, DeviceLimits, ScenePlan};
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct InfoArgs {
+    /// Where heights come from.
+    #[command(flatten)]
+    pub terrain: Option<TerrainArgs>,
+    /// What this scene needs on the device, and what it leaves out.
+    #[arg(long, requires = "terrain")]
+    pub plan: bool,
+    /// Vulkan devices, and what is missing on each.
+    #[arg(long)]
+    pub devices: bool,
+    /// The technique planned for.
+    #[command(flatten)]
+    pub technique: TechniqueArgs,
+    /// The look planned for.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// What was read.
+#[derive(Serialize)]
+pub struct Info {
+    format: String,
+    width: u32,
+    height: u32,
+    spacing_m: [f64; 2],
+    origin: [f64; 2],
+    crs: Option<String>,
+    min_m: f32,
+    max_m: f32,
+    mean_m: f64,
+    hole_count: u64,
+    sample_type: String,
+    exact_in_16_bit: bool,
+    /// Largest difference between the two ways to split a cell, metres.
+    cell_ambiguity_m: f32,
+    warnings: Vec<String>,
+}
+
+impl Info {
+    /// Describes a field that was read.
+    pub fn of(loaded: &Loaded) -> Self {
+        let field = &loaded.field;
+        let [width, height] = field.size();
+        let statistics = field.statistics();
+        Self {
+            format: loaded.format.to_string(),
+            width,
+            height,
+            spacing_m: field.spacing,
+            origin: field.origin,
+            crs: field.crs.clone(),
+            min_m: statistics.min,
+            max_m: statistics.max,
+            mean_m: statistics.mean,
+            hole_count: field.holes().count(),
+            sample_type: loaded.sample_type.clone(),
+            exact_in_16_bit: loaded.exact_in_16_bit,
+            cell_ambiguity_m: field.cell_ambiguity(),
+            warnings: loaded.warnings.clone(),
+        }
+    }
+}
+
+/// What a scene keeps and leaves out, and what its technique prepared.
+#[derive(Serialize)]
+struct Plan {
+    technique: &'static str,
+    kept: Vec<Decision>,
+    left_out: Vec<Decision>,
+    figures: Vec<Figure>,
+}
+
+#[derive(Serialize)]
+struct Figure {
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
+    if args.devices {
+        return devices(common);
+    }
+    let Some(terrain) = &args.terrain else {
+        bail!("info: expected a terrain or --devices");
+    };
+    let loaded = terrain.load(common)?;
+    if !args.plan {
+        report::print(common, &Info::of(&loaded))?;
+        return Ok(Outcome::Done);
+    }
+    let (look, _) = args.look.build(terrain)?;
+    let plan = ScenePlan::new(&loaded.field, &look, &device_limits(common)?).map_err(anyhow::Error::msg)?;
+    let (kept, left_out) = plan.decisions(&loaded.field);
+    let (entry, _) = args.technique.settings()?;
+    let technique = args.technique.build(common, &std::sync::Arc::new(loaded.field))?;
+    let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
+    report::print(common, &Plan { technique: entry.name, kept, left_out, figures })?;
+    Ok(Outcome::Done)
+}
+
+#[cfg(feature = "vulkan")]
+fn device_limits(common: &Common) -> Result<DeviceLimits> {
+    Ok(super::render::open(common, false)?.device_limits())
+}
+
+/// Without Vulkan, plans are made for what every desktop device has.
+#[cfg(not(feature = "vulkan"))]
+fn device_limits(_: &Common) -> Result<DeviceLimits> {
+    Ok(DeviceLimits { image_side: 16384, image_layers: 2048, filters_heights: true })
+}
+
+#[cfg(not(feature = "vulkan"))]
+fn devices(_: &Common) -> Result<Outcome> {
+    bail!("--devices: this build is without Vulkan");
+}
+
+#[cfg(feature = "vulkan")]
+fn devices(common: &Common) -> Result<Outcome> {
+    use crate::gpu::{Instance, device};
+
+    #[derive(Serialize)]
+    struct Device {
+        name: String,
+        kind: String,
+        vulkan: String,
+        driver: String,
+        usable: bool,
+        missing: Vec<String>,
+    }
+    #[derive(Serialize)]
+    struct Devices {
+        devices: Vec<Device>,
+    }
+    let instance = Instance::new(&[], common.validate)?;
+    let devices = device::candidates(&instance)?.into_iter().map(|c| Device {
+        kind: format!("{:?}", c.kind).to_lowercase(),
+        usable: c.missing.is_empty(),
+        name: c.name,
+        vulkan: c.version,
+        driver: c.driver,
+        missing: c.missing,
+    });
+    report::print(common, &Devices { devices: devices.collect() })?;
+    Ok(Outcome::Done)
+}

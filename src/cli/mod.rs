@@ -1,0 +1,134 @@
+//! The program: one file a subcommand. Names and JSON fields are a contract for scripts.
+
+pub mod export;
+pub mod info;
+#[cfg(feature = "vulkan")]
+pub mod render;
+pub mod report;
+pub mod scene;
+pub mod synth;
+#[cfg(feature = "viewer")]
+pub mod view;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+/// Large terrain drawn with a bounded error.
+#[derive(Parser, Debug)]
+#[command(name = "cuesta", version, about, args_override_self = true)]
+pub struct Cli {
+    /// What every subcommand takes.
+    #[command(flatten)]
+    pub common: Common,
+    /// The subcommand; without one, `view demo` on a display and `render demo -o cuesta.png` elsewhere.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What every subcommand takes.
+#[derive(Args, Debug, Clone, Default)]
+pub struct Common {
+    /// One JSON document on stdout and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say only what was asked for.
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Vulkan device: part of its name, or `cpu` for a software device.
+    #[arg(long, global = true, value_name = "NAME")]
+    pub device: Option<String>,
+    /// Validation layers on; any message makes the exit code 1.
+    #[arg(long, global = true)]
+    pub validate: bool,
+}
+
+/// The subcommands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// What was read from a height file; devices; the scene plan.
+    Info(info::InfoArgs),
+    /// One picture.
+    #[cfg(feature = "vulkan")]
+    Render(render::RenderArgs),
+    /// The as-drawn mesh of one view: PLY, OBJ or GLB.
+    Export(export::ExportArgs),
+    /// The window.
+    #[cfg(feature = "viewer")]
+    View(view::ViewerArgs),
+    /// A synthetic field.
+    Synth(synth::SynthArgs),
+}
+
+/// How a run ended, if it did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for was done: exit code 0.
+    Done,
+    /// A limit was missed — a crack, an error, a validation message: exit code 1.
+    LimitMissed,
+}
+
+/// Parses the command line and runs it. Failures and wrong use are one line on stderr and exit code 2.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if !error.use_stderr() => {
+            print!("{error}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => {
+            let text = error.to_string();
+            let line: Vec<_> = text.lines().map(str::trim).take_while(|l| !l.is_empty()).collect();
+            eprintln!("{}", line.join(" "));
+            return ExitCode::from(2);
+        }
+    };
+    match run(cli) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::LimitMissed) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {}", format!("{error:#}").replace('\n', " "));
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<Outcome> {
+    let common = cli.common;
+    match cli.command {
+        Some(Command::Info(args)) => info::run(&common, &args),
+        #[cfg(feature = "vulkan")]
+        Some(Command::Render(args)) => render::run(&common, &args),
+        Some(Command::Export(args)) => export::run(&common, &args),
+        #[cfg(feature = "viewer")]
+        Some(Command::View(args)) => view::run(&common, &args),
+        Some(Command::Synth(args)) => synth::run(&common, &args),
+        None => without_subcommand(&common),
+    }
+}
+
+#[cfg(feature = "vulkan")]
+fn without_subcommand(common: &Common) -> Result<Outcome> {
+    #[cfg(feature = "viewer")]
+    if view::has_display() {
+        return view::run(common, &parse_as(&["view", "demo"]));
+    }
+    eprintln!("no display: rendering cuesta.png instead");
+    let Some(Command::Render(args)) = Cli::parse_from(["cuesta", "render", "demo", "-o", "cuesta.png"]).command else {
+        unreachable!("that is the render subcommand")
+    };
+    render::run(common, &args)
+}
+
+#[cfg(not(feature = "vulkan"))]
+fn without_subcommand(_: &Common) -> Result<Outcome> {
+    Cli::command().print_help()?;
+    Ok(Outcome::Done)
+}
+
+/// The command line's own description, for tests that hold documents against it.
+pub fn command() -> clap::Command {
+    Cli::command()
+}

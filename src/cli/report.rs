@@ -1,0 +1,61 @@
+//! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use indicatif::ProgressBar;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::Common;
+
+/// Prints a result: as one JSON document, or one line a field.
+pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
+    let value = serde_json::to_value(result)?;
+    if common.json {
+        println!("{}", serde_json::to_string_pretty(&value)?);
+    } else if let (Value::Object(fields), false) = (value, common.quiet) {
+        for (name, value) in fields.iter().filter(|(_, value)| !value.is_null()) {
+            print_field(&name.replace('_', " "), value);
+        }
+    }
+    Ok(())
+}
+
+fn print_field(name: &str, value: &Value) {
+    match value {
+        Value::Array(rows) if rows.iter().any(Value::is_object) => {
+            println!("{name}:");
+            for row in rows {
+                println!("  {}", plain(row));
+            }
+        }
+        _ => println!("{name}: {}", plain(value)),
+    }
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
+        Value::Object(fields) => {
+            fields.iter().map(|(name, value)| format!("{name} {}", plain(value))).collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Says something that is no failure, on stderr.
+pub fn warn(common: &Common, text: &str) {
+    if !common.quiet {
+        eprintln!("warning: {text}");
+    }
+}
+
+/// Shows on a terminal that something takes long; gone when dropped.
+pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
+    let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+    bar.set_message(what.into());
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar
+}

@@ -1,0 +1,387 @@
+//! What the command line says about terrain, view, technique and look, turned into the things themselves.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+
+use super::{Common, report};
+use crate::height::load::{self, Encoding, HoleFill, Loaded, Options, RawLayout};
+use crate::height::{Error, Field, demo};
+use crate::lod::{self, Settings, Technique};
+use crate::plan::{Colour, Look};
+use crate::view::{Lens, Metric, Tolerance, View};
+
+/// Where heights come from and how they are read.
+#[derive(Args, Debug, Clone)]
+pub struct TerrainArgs {
+    /// A height file of any supported format, a directory of web-map tiles, or `demo`.
+    pub terrain: String,
+    /// Distance of neighbouring samples, metres, instead of what the file says.
+    #[arg(long, value_name = "DX[,DZ]", value_parser = pair_or_one)]
+    pub spacing: Option<[f64; 2]>,
+    /// Multiplies every height.
+    #[arg(long, value_name = "S")]
+    pub height_scale: Option<f64>,
+    /// The value that means "no data", instead of what the file says.
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    pub nodata: Option<f64>,
+    /// The file is bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
+    #[arg(long, value_name = "LAYOUT")]
+    pub raw: Option<RawLayout>,
+    /// The part to keep, in samples.
+    #[arg(long, value_name = "X,Z,W,H", value_parser = numbers::<u32, 4>)]
+    pub crop: Option<[u32; 4]>,
+    /// Repeat the field.
+    #[arg(long, value_name = "NX,NZ", value_parser = numbers::<u32, 2>)]
+    pub tile: Option<[u32; 2]>,
+    /// What is done with samples without data: no (they stay holes) or interpolate.
+    #[arg(long, value_name = "HOW", default_value = "no", value_parser = hole_fill)]
+    pub hole_fill: HoleFill,
+    /// How a colour picture encodes heights: terrarium or mapbox.
+    #[arg(long, value_name = "E", value_parser = encoding)]
+    pub encoding: Option<Encoding>,
+    /// Zoom level of a tile directory.
+    #[arg(long)]
+    pub zoom: Option<u32>,
+    /// Files that claim more samples are refused.
+    #[arg(long, value_name = "N", default_value_t = 1 << 30)]
+    pub max_samples: u64,
+}
+
+/// Where the eye is and how it projects.
+#[derive(Args, Debug, Clone)]
+pub struct ViewArgs {
+    /// Position of the eye, world metres; Y may be +H, height above ground.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub eye: Option<String>,
+    /// The point to look at, world metres.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch"])]
+    pub look: Option<String>,
+    /// Heading, degrees: 0 = east, 90 = south.
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub yaw: Option<f64>,
+    /// Degrees above the horizon.
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub pitch: Option<f64>,
+    /// Degrees clockwise.
+    #[arg(long, value_name = "D", allow_negative_numbers = true, default_value_t = 0.0)]
+    pub roll: f64,
+    /// Horizontal field of view, degrees.
+    #[arg(long, value_name = "D", default_value_t = 60.0)]
+    pub fov: f64,
+    /// Pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: [u32; 2],
+    /// Near plane, metres; by default a thousandth of the height above ground, at least 0.1.
+    #[arg(long, value_name = "M")]
+    pub near: Option<f64>,
+    /// Orthographic, with a picture this many metres wide.
+    #[arg(long, value_name = "M")]
+    pub ortho: Option<f64>,
+}
+
+/// Which technique draws, and how well.
+#[derive(Args, Debug, Clone)]
+pub struct TechniqueArgs {
+    /// Technique, or technique:variant.
+    #[arg(long, value_name = "T", default_value = "geomipmap", help = technique_help())]
+    pub technique: String,
+    /// A setting of the technique; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    pub settings: Vec<(String, String)>,
+    /// Error allowed, pixels.
+    #[arg(long, value_name = "PX", default_value_t = 1.0)]
+    pub tolerance: f64,
+    /// What a pixel of error means.
+    #[arg(long, value_enum, default_value_t = MetricArg::Certified)]
+    pub metric: MetricArg,
+}
+
+/// How the land looks.
+#[derive(Args, Debug, Clone)]
+pub struct LookArgs {
+    /// What colours say; `overlay` if a picture is given, else `height`.
+    #[arg(long, value_enum)]
+    pub colour: Option<ColourArg>,
+    /// A picture laid over the field.
+    #[arg(long, value_name = "IMG")]
+    pub overlay: Option<String>,
+    /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
+    #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>, allow_hyphen_values = true)]
+    pub sun: Option<[f64; 2]>,
+    /// Optical density of the fog per metre.
+    #[arg(long, value_name = "DENSITY", default_value_t = 0.0)]
+    pub fog: f64,
+    /// Edges only.
+    #[arg(long)]
+    pub wireframe: bool,
+}
+
+/// [`Metric`] as a word.
+#[derive(ValueEnum, Clone, Copy, Debug)]
+pub enum MetricArg {
+    /// A true bound for every pixel.
+    Certified,
+    /// As published.
+    Paper,
+}
+
+/// [`Colour`] as a word.
+#[derive(ValueEnum, Clone, Copy, Debug)]
+pub enum ColourArg {
+    /// Hypsometric tint.
+    Height,
+    /// Level of detail.
+    Level,
+    /// The overlay picture.
+    Overlay,
+    /// Distance from the samples' surface: blue exact, red one pixel, white more.
+    Error,
+    /// Surface normal.
+    Normal,
+    /// Draw.
+    Batch,
+}
+
+fn technique_help() -> String {
+    let names = lod::TECHNIQUES.iter().flat_map(|entry| {
+        let variants = entry.variants.iter().map(|v| format!("{}:{}", entry.name, v.name));
+        std::iter::once(entry.name.to_string()).chain(variants)
+    });
+    format!("Technique, or technique:variant: {}", names.collect::<Vec<_>>().join(", "))
+}
+
+fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
+    let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let found = text.split(',').count();
+    if found != parts.len() {
+        return Err("expected numbers separated by commas".to_string());
+    }
+    parts.try_into().map_err(|_| format!("expected {N} numbers separated by commas, found {found}"))
+}
+
+fn pair_or_one(text: &str) -> Result<[f64; 2], String> {
+    let pair = numbers::<f64, 2>(text).or_else(|_| numbers::<f64, 1>(text).map(|[s]| [s, s]))?;
+    if pair.iter().all(|s| s.is_finite() && *s > 0.0) { Ok(pair) } else { Err("expected positive metres".to_string()) }
+}
+
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let pair = numbers::<u32, 2>(&text.replace('x', ","));
+    pair.ok().filter(|s| s.iter().all(|&n| n > 0)).ok_or_else(|| "expected WxH, as in 1280x720".to_string())
+}
+
+fn key_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
+    Ok((key.trim().to_string(), value.trim().to_string()))
+}
+
+fn hole_fill(text: &str) -> Result<HoleFill, String> {
+    match text {
+        "no" => Ok(HoleFill::No),
+        "interpolate" => Ok(HoleFill::Interpolate),
+        _ => Err("expected no or interpolate".to_string()),
+    }
+}
+
+fn encoding(text: &str) -> Result<Encoding, String> {
+    match text {
+        "terrarium" => Ok(Encoding::Terrarium),
+        "mapbox" => Ok(Encoding::Mapbox),
+        _ => Err("expected terrarium or mapbox".to_string()),
+    }
+}
+
+impl TerrainArgs {
+    /// Reads the field, and says what the reader warns of.
+    pub fn load(&self, common: &Common) -> Result<Loaded> {
+        let options = Options {
+            spacing: self.spacing,
+            height_scale: self.height_scale,
+            nodata: self.nodata,
+            raw: self.raw,
+            crop: self.crop,
+            tiles: self.tile,
+            hole_fill: self.hole_fill,
+            encoding: self.encoding,
+            zoom: self.zoom,
+            max_samples: self.max_samples,
+        };
+        let _spinner = report::spinner(common, format!("reading {}", self.terrain));
+        let loaded = if self.is_demo() {
+            load::load_bytes("demo", demo::PICTURE, &demo_options(options))?
+        } else {
+            load::load(Path::new(&self.terrain), &options)?
+        };
+        for warning in &loaded.warnings {
+            report::warn(common, warning);
+        }
+        Ok(loaded)
+    }
+
+    /// Whether it is the embedded terrain, which has an overlay of its own.
+    pub fn is_demo(&self) -> bool {
+        self.terrain == "demo" && !Path::new("demo").exists()
+    }
+}
+
+/// What the embedded picture's pixels mean, unless the user says otherwise.
+fn demo_options(options: Options) -> Options {
+    Options {
+        spacing: options.spacing.or(Some([demo::SPACING; 2])),
+        height_scale: Some(f64::from(demo::SCALE) * options.height_scale.unwrap_or(1.0)),
+        raw: None,
+        ..options
+    }
+}
+
+impl LookArgs {
+    /// The look, and the picture it lays over the field.
+    pub fn build(&self, terrain: &TerrainArgs) -> Result<(Look, Option<image::RgbaImage>)> {
+        let colour = match (self.colour, &self.overlay) {
+            (Some(ColourArg::Height), _) => Colour::Height,
+            (Some(ColourArg::Level), _) => Colour::Level,
+            (Some(ColourArg::Error), _) => Colour::Error,
+            (Some(ColourArg::Normal), _) => Colour::Normal,
+            (Some(ColourArg::Batch), _) => Colour::Batch,
+            (Some(ColourArg::Overlay), _) | (None, Some(_)) => Colour::Overlay,
+            (None, None) if terrain.is_demo() => Colour::Overlay,
+            (None, None) => Colour::Height,
+        };
+        let picture = match (&self.overlay, colour) {
+            (Some(path), Colour::Overlay) => Some(read_picture(path)?),
+            (None, Colour::Overlay) if terrain.is_demo() => {
+                Some(image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8())
+            }
+            (None, Colour::Overlay) => bail!("--colour overlay: no picture given, expected --overlay IMG"),
+            _ => None,
+        };
+        let defaults = Look::default();
+        let sun = self.sun.unwrap_or(defaults.sun);
+        if !(self.fog.is_finite() && self.fog >= 0.0) {
+            bail!("--fog {}: expected a density of 0 or more per metre", self.fog);
+        }
+        Ok((Look { colour, sun, fog: self.fog, wireframe: self.wireframe }, picture))
+    }
+}
+
+fn read_picture(path: &str) -> Result<image::RgbaImage> {
+    let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
+    let reader = image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;
+    Ok(reader.decode().map_err(|e| fail(&e))?.into_rgba8())
+}
+
+impl TechniqueArgs {
+    /// The table's row, and the settings for it.
+    pub fn settings(&self) -> Result<(&'static lod::Entry, Settings)> {
+        let (name, variant) = match self.technique.split_once(':') {
+            Some((name, variant)) => (name, Some(variant)),
+            None => (self.technique.as_str(), None),
+        };
+        let entry = lod::find(name).ok_or_else(|| {
+            let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
+            anyhow!("--technique {name}: expected one of {}", known.join(", "))
+        })?;
+        let settings = Settings::new(entry, variant, &self.settings).map_err(|e| anyhow!("--set: {e}"))?;
+        Ok((entry, settings))
+    }
+
+    /// The technique, prepared for the field.
+    pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
+        let (entry, settings) = self.settings()?;
+        let _spinner = report::spinner(common, format!("preparing {}", entry.name));
+        Ok((entry.build)(Arc::clone(field), &settings))
+    }
+
+    /// The tolerance under the metric.
+    pub fn tolerance(&self) -> Result<Tolerance> {
+        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
+            bail!("--tolerance {}: expected a positive number of pixels", self.tolerance);
+        }
+        let metric = match self.metric {
+            MetricArg::Certified => Metric::Certified,
+            MetricArg::Paper => Metric::Paper,
+        };
+        Ok(Tolerance { px: self.tolerance, metric })
+    }
+}
+
+impl ViewArgs {
+    /// The view of a field; where nothing is said, a three-quarter view of all of it.
+    pub fn build(&self, field: &Field, tolerance: Tolerance) -> Result<View> {
+        if !(self.fov > 0.0 && self.fov < 180.0) {
+            bail!("--fov {}: expected degrees between 0 and 180", self.fov);
+        }
+        let whole = Whole::of(field, self.fov, self.size);
+        let eye = match &self.eye {
+            Some(text) => position("--eye", text, field)?,
+            None => whole.eye,
+        };
+        let world_from_eye = match (&self.look, self.yaw, self.pitch) {
+            (Some(text), _, _) => {
+                View::looking_along(position("--look", text, field)? - eye) * View::rolled(self.roll)
+            }
+            (None, None, None) if self.eye.is_none() => View::looking_along(whole.centre - eye) * View::rolled(self.roll),
+            (None, yaw, pitch) => View::turned(yaw.unwrap_or(-90.0), pitch.unwrap_or(0.0), self.roll),
+        };
+        let above = eye.y - field.height_at(eye.x, eye.z).unwrap_or(whole.centre.y);
+        let near = self.near.unwrap_or((above.abs() / 1000.0).max(0.1));
+        if !(near.is_finite() && near > 0.0) {
+            bail!("--near {near}: expected a positive number of metres");
+        }
+        let lens = match self.ortho {
+            Some(width) if width.is_finite() && width > 0.0 => {
+                Lens::Orthographic { width, far: near + 2.0 * (eye.distance(whole.centre) + whole.radius) }
+            }
+            Some(width) => bail!("--ortho {width}: expected a positive number of metres"),
+            None => Lens::Perspective { fov_x: self.fov.to_radians() },
+        };
+        Ok(View { eye, world_from_eye, lens, size: self.size, near, tolerance })
+    }
+}
+
+/// The field as one thing to look at.
+pub struct Whole {
+    /// Its centre at mean height.
+    pub centre: DVec3,
+    /// Half its diagonal in plan, metres.
+    pub radius: f64,
+    /// From where all of it is seen, from the south and above.
+    pub eye: DVec3,
+}
+
+impl Whole {
+    /// The view of a whole field for a field of view in degrees.
+    pub fn of(field: &Field, fov: f64, size: [u32; 2]) -> Self {
+        let statistics = field.statistics();
+        let [w, h] = field.size().map(f64::from);
+        let centre = field.world_at((w - 1.0) / 2.0, (h - 1.0) / 2.0, statistics.mean);
+        let extent = field.world_at(w - 1.0, h - 1.0, statistics.mean) - field.world_at(0.0, 0.0, statistics.mean);
+        let radius = extent.x.hypot(extent.z) / 2.0;
+        // The picture's smaller half-angle sees the radius, seen from the side as it is, with some air.
+        let slope = (fov.to_radians() / 2.0).tan();
+        let upright = slope * f64::from(size[1]) / f64::from(size[0]);
+        let distance = (extent.x.max(extent.z * 0.6) / 2.0 / slope).max(radius * 0.55 / upright) * 1.15;
+        let direction = DVec3::new(0.35, 0.62, 1.0).normalize_or(DVec3::Y);
+        Self { centre, radius, eye: centre + direction * distance }
+    }
+}
+
+/// A position `X,Y,Z`, where Y may be `+H`, a height above the ground.
+fn position(flag: &str, text: &str, field: &Field) -> Result<DVec3> {
+    let parts: Vec<_> = text.split(',').map(str::trim).collect();
+    let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, Y possibly +H above ground");
+    let &[x, y, z] = parts.as_slice() else { return Err(wrong()) };
+    let number = |part: &str| part.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+    let (x, z) = (number(x)?, number(z)?);
+    let y = match y.strip_prefix('+') {
+        Some(above) => {
+            let ground = field.height_at(x, z);
+            ground.with_context(|| format!("{flag} {text}: there is no land below"))? + number(above)?
+        }
+        None => number(y)?,
+    };
+    Ok(DVec3::new(x, y, z))
+}
