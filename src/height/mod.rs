@@ -1,5 +1,28 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+mod archive;
+mod asc;
+mod bil;
+mod envi;
+mod geokeys;
+mod georef;
+mod geotiff;
+mod hgt;
+mod load;
+mod png;
+mod raster;
+mod raw;
+mod sample;
+mod terrain_rgb;
+mod text;
+mod tiff_directory;
+mod tiles;
+mod usgs_dem;
+
+pub use georef::metres_per_degree;
+pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes};
+pub use sample::{Order, SampleType};
+
 use glam::DVec3;
 
 /// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.

@@ -1,0 +1,3 @@
+//! All integration tests in one binary; modules mirror `src/`.
+
+mod height;
