@@ -1,3 +1,4 @@
 //! All integration tests in one binary; the modules mirror `src/`.
 
+mod height;
 mod synth;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs};
 use super::{Common, Outcome, report};
-use crate::height::load::Loaded;
+use crate::height::Loaded;
 use crate::plan::{Decision, DeviceLimits, ScenePlan};
 
 /// Arguments.

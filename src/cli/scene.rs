@@ -8,8 +8,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::{Common, report};
-use crate::height::load::{self, Encoding, HoleFill, Loaded, Options, RawLayout};
-use crate::height::{Error, Field, demo};
+use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Look};
 use crate::view::{Lens, Metric, Tolerance, View};
@@ -211,9 +210,9 @@ impl TerrainArgs {
         };
         let _spinner = report::spinner(common, format!("reading {}", self.terrain));
         let loaded = if self.is_demo() {
-            load::load_bytes("demo", demo::PICTURE, &demo_options(options))?
+            load_bytes("demo", demo::PICTURE, &demo_options(options))?
         } else {
-            load::load(Path::new(&self.terrain), &options)?
+            load(Path::new(&self.terrain), &options)?
         };
         for warning in &loaded.warnings {
             report::warn(common, warning);

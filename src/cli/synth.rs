@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::info::Info;
 use super::{Common, Outcome, report};
-use crate::height::load::Loaded;
+use crate::height::Loaded;
 use crate::height::synth::{self, Kind};
 use crate::height::{Samples, save};
 

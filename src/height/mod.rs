@@ -1,10 +1,32 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+mod archive;
+mod asc;
+mod bil;
 pub mod demo;
+mod envi;
+mod geokeys;
+mod georef;
+mod geotiff;
+mod hgt;
+mod load;
+mod png;
+mod raster;
+mod raw;
 pub mod rtin;
+mod sample;
 pub mod save;
 pub mod surface;
 pub mod synth;
+mod terrain_rgb;
+mod text;
+mod tiff_directory;
+mod tiles;
+mod usgs_dem;
+
+pub use georef::metres_per_degree;
+pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes};
+pub use sample::{Order, SampleType};
 
 use glam::DVec3;
 

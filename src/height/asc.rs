@@ -1,0 +1,129 @@
+//! ESRI ASCII grid: a header of keys and numbers, then heights as text, rows from the north.
+
+use super::{
+    Error, Samples,
+    georef::{self, Place},
+    load::{Options, Source},
+    raster::Raster,
+    text::Words,
+};
+
+/// The keys of a header, lower case.
+const KEYS: [&str; 11] = [
+    "ncols",
+    "nrows",
+    "xllcorner",
+    "xllcenter",
+    "yllcorner",
+    "yllcenter",
+    "cellsize",
+    "dx",
+    "dy",
+    "nodata_value",
+    "nodata",
+];
+
+/// Whether a file begins as a grid does.
+pub(super) fn is_header(head: &[u8]) -> bool {
+    let word = head.trim_ascii_start().split(u8::is_ascii_whitespace).next().unwrap_or_default();
+    KEYS.iter().any(|key| word.eq_ignore_ascii_case(key.as_bytes()))
+}
+
+/// Reads a grid.
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+    let mut words = Words::new();
+    let header = Header::read(source, &mut words)?;
+    let size = header.size(source)?;
+    let count = source.samples(size, options)?;
+    // A height takes a digit and a space, but for the last.
+    source.need("heights", (count as u64).saturating_mul(2) - 1)?;
+    let heights = read_heights(source, &mut words, count)?;
+    let size = size.map(|n| n as u32);
+    let mut raster = Raster::new("ESRI ASCII grid", "text", size, Samples::F32(heights));
+    raster.nodata = header.value(&["nodata_value", "nodata"]);
+    let (origin, step) = header.place(source, size)?;
+    (raster.place, raster.warnings) = place(source, origin, step, size);
+    Ok(raster)
+}
+
+/// The numbers of a header.
+struct Header(Vec<(String, f64)>);
+
+impl Header {
+    /// Reads keys and numbers up to the first height, at which `words` stays.
+    fn read(source: &mut Source, words: &mut Words) -> Result<Self, Error> {
+        let mut values = Vec::new();
+        loop {
+            words.next(source)?;
+            let key = words.word().to_lowercase();
+            if !KEYS.contains(&key.as_str()) || values.len() > KEYS.len() {
+                return Ok(Self(values));
+            }
+            words.next(source)?;
+            values.push((key, number(source, words)?));
+        }
+    }
+
+    fn value(&self, keys: &[&str]) -> Option<f64> {
+        self.0.iter().find(|(key, _)| keys.contains(&key.as_str())).map(|&(_, value)| value)
+    }
+
+    fn size(&self, source: &Source) -> Result<[u64; 2], Error> {
+        let side = |key: &str| match self.value(&[key]) {
+            Some(n) if n >= 0.0 && n.fract() == 0.0 && n < 1e15 => Ok(n as u64),
+            Some(n) => Err(source.error(key, format!("expected a whole number, found {n}"))),
+            None => Err(source.error(key, "expected in the header, found none")),
+        };
+        Ok([side("ncols")?, side("nrows")?])
+    }
+
+    /// Coordinates of the north-west sample, and steps.
+    fn place(&self, source: &Source, [_, rows]: [u32; 2]) -> Result<([f64; 2], [f64; 2]), Error> {
+        let step = [self.value(&["dx", "cellsize"]), self.value(&["dy", "cellsize"])];
+        let [Some(dx), Some(dy)] = step else {
+            return Err(source.error("cellsize", "expected cellsize or dx and dy, found none"));
+        };
+        if !(dx > 0.0 && dy > 0.0) {
+            return Err(source.error("cellsize", format!("expected a positive number, found {dx}, {dy}")));
+        }
+        let corner = |corner: &str, centre: &str, step: f64| {
+            self.value(&[centre]).or(self.value(&[corner]).map(|at| at + step / 2.0)).unwrap_or(step / 2.0)
+        };
+        let west = corner("xllcorner", "xllcenter", dx);
+        let north = corner("yllcorner", "yllcenter", dy) + dy * f64::from(rows - 1);
+        Ok(([west, north], [dx, dy]))
+    }
+}
+
+/// The place by the projection beside the file, else by the look of the coordinates.
+pub(super) fn place(source: &Source, origin: [f64; 2], step: [f64; 2], size: [u32; 2]) -> (Option<Place>, Vec<String>) {
+    match source.sibling_text("prj").and_then(|text| georef::from_wkt(&text)) {
+        Some((unit, crs)) => (Some(Place { origin, step, unit, crs }), Vec::new()),
+        None => {
+            let (place, warning) = Place::guessed(origin, step, size);
+            (Some(place), vec![warning])
+        }
+    }
+}
+
+fn read_heights(source: &mut Source, words: &mut Words, count: usize) -> Result<Vec<f32>, Error> {
+    let mut heights: Vec<f32> = Vec::with_capacity(count);
+    while !words.word().is_empty() {
+        if heights.len() == count {
+            return Err(source.error(format!("line {}", words.line), format!("expected {count} heights, found more")));
+        }
+        heights.push(number(source, words)? as f32);
+        words.next(source)?;
+    }
+    if heights.len() < count {
+        let what = format!("expected {count} heights, found {}", heights.len());
+        return Err(source.error(format!("line {}", words.line), what));
+    }
+    Ok(heights)
+}
+
+fn number(source: &Source, words: &Words) -> Result<f64, Error> {
+    let wrong =
+        |_| source.error(format!("line {}", words.line), format!("expected a number, found {:?}", words.word()));
+    words.word().parse().map_err(wrong)
+}

@@ -1,0 +1,260 @@
+//! Reads a height file of any supported format, recognised by its content.
+
+use std::{
+    fs::File,
+    io::{self, BufRead, BufReader, Cursor, Read, Seek},
+    path::Path,
+};
+
+use super::{Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, tiles, usgs_dem};
+pub use super::{raw::RawLayout, terrain_rgb::Encoding};
+
+/// What is done with samples without data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HoleFill {
+    /// They stay holes.
+    #[default]
+    No,
+    /// They get the heights interpolated from around them and count as data.
+    Interpolate,
+}
+
+/// Wishes about how a file is read.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Distance of neighbouring samples (x, z), metres, instead of what the file says.
+    pub spacing: Option<[f64; 2]>,
+    /// Multiplies every height.
+    pub height_scale: Option<f64>,
+    /// The value that means "no data", instead of what the file says.
+    pub nodata: Option<f64>,
+    /// The file is bare samples of this layout.
+    pub raw: Option<RawLayout>,
+    /// The part to keep: x, z, width, height in samples.
+    pub crop: Option<[u32; 4]>,
+    /// How often the field repeats along (x, z).
+    pub tiles: Option<[u32; 2]>,
+    /// What is done with samples without data.
+    pub hole_fill: HoleFill,
+    /// How a colour picture encodes heights.
+    pub encoding: Option<Encoding>,
+    /// Zoom level of a tile directory; by default the highest complete one.
+    pub zoom: Option<u32>,
+    /// Files that claim more samples are refused.
+    pub max_samples: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            spacing: None,
+            height_scale: None,
+            nodata: None,
+            raw: None,
+            crop: None,
+            tiles: None,
+            hole_fill: HoleFill::No,
+            encoding: None,
+            zoom: None,
+            max_samples: 1 << 30,
+        }
+    }
+}
+
+/// A field read from a file, and what is worth saying about it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The heights.
+    pub field: Field,
+    /// Name of the file format.
+    pub format: &'static str,
+    /// How the file stores a sample, as in `i16`.
+    pub sample_type: String,
+    /// Whether 16 bits a sample hold every height without loss.
+    pub exact_in_16_bit: bool,
+    /// What the user should know, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a file or a directory of tiles.
+pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    let name = path.display().to_string();
+    if path.is_dir() {
+        return tiles::read(path, options)?.finish(&name, options);
+    }
+    let siblings = |extension: &str| sibling(path, extension);
+    let (file, len) = open(path)?;
+    let mut source = Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings };
+    match source.kind(options)? {
+        Kind::Header => {
+            let data = bil::data_beside(path)
+                .ok_or_else(|| source.error("data", "expected a data file beside the header, found none"))?;
+            let (file, len) = open(&data)?;
+            let name = data.display().to_string();
+            let mut source = Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings };
+            read(&mut source, Kind::Bil, options)?.finish(&name, options)
+        }
+        kind => read(&mut source, kind, options)?.finish(&name, options),
+    }
+}
+
+/// Reads a file held in memory; `name` is for messages, and for the position of SRTM tiles.
+pub fn load_bytes(name: &str, bytes: &[u8], options: &Options) -> Result<Loaded, Error> {
+    let len = bytes.len() as u64;
+    let mut source = Source { name, reader: &mut Cursor::new(bytes), len, siblings: &|_| None };
+    let kind = source.kind(options)?;
+    read(&mut source, kind, options)?.finish(name, options)
+}
+
+fn open(path: &Path) -> Result<(File, u64), Error> {
+    let error = |e: io::Error| Error::new(path.display().to_string(), "file", format!("expected a readable file, {e}"));
+    let file = File::open(path).map_err(error)?;
+    let metadata = file.metadata().map_err(error)?;
+    if !metadata.is_file() {
+        return Err(error(io::Error::other("found neither a file nor a directory")));
+    }
+    Ok((file, metadata.len()))
+}
+
+/// The most bytes read from a file beside the data: headers and projections are short texts.
+const SIBLING_BYTES: u64 = 1 << 20;
+
+/// The file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
+fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
+    let mut appended = path.as_os_str().to_owned();
+    appended.push(format!(".{extension}"));
+    let upper = extension.to_uppercase();
+    [path.with_extension(extension), appended.into(), path.with_extension(upper)]
+        .into_iter()
+        .filter(|other| other != path && other.is_file())
+        .find_map(|other| {
+            let mut bytes = Vec::new();
+            File::open(other).ok()?.take(SIBLING_BYTES).read_to_end(&mut bytes).ok()?;
+            Some(bytes)
+        })
+}
+
+/// What loaders read from.
+pub(super) trait Input: BufRead + Seek {}
+impl<T: BufRead + Seek> Input for T {}
+
+/// One file: bytes, and the small files beside it.
+pub(super) struct Source<'a> {
+    /// The name in messages.
+    pub name: &'a str,
+    /// The bytes, from the beginning.
+    pub reader: &'a mut dyn Input,
+    /// How many bytes there are.
+    pub len: u64,
+    /// The file beside this one that has the given extension.
+    pub siblings: &'a dyn Fn(&str) -> Option<Vec<u8>>,
+}
+
+impl Source<'_> {
+    /// An error at a place of this file.
+    pub fn error(&self, place: impl Into<String>, what: impl ToString) -> Error {
+        Error::new(self.name, place, what)
+    }
+
+    /// The text of the file beside this one that has the given extension.
+    pub fn sibling_text(&self, extension: &str) -> Option<String> {
+        (self.siblings)(extension).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// The number of samples of a size, if it is allowed.
+    pub fn samples(&self, size: [u64; 2], options: &Options) -> Result<usize, Error> {
+        samples(self.name, size, options)
+    }
+
+    /// Refuses a file that ends before `needed` bytes.
+    pub fn need(&self, place: &str, needed: u64) -> Result<(), Error> {
+        if self.len < needed {
+            return Err(self.error(place, format!("expected at least {needed} bytes, found {}", self.len)));
+        }
+        Ok(())
+    }
+
+    fn kind(&mut self, options: &Options) -> Result<Kind, Error> {
+        let mut head = Vec::new();
+        let read = self.reader.take(HEAD_BYTES).read_to_end(&mut head);
+        read.and_then(|_| self.reader.rewind()).map_err(|e| self.error("byte 0", e))?;
+        match options.raw {
+            Some(_) => Ok(Kind::Raw),
+            None => Ok(Kind::of(&head, self.len, (self.siblings)("hdr").is_some())),
+        }
+    }
+}
+
+/// The number of samples of a size, if it is allowed.
+pub(super) fn samples(name: &str, [w, h]: [u64; 2], options: &Options) -> Result<usize, Error> {
+    if w < 2 || h < 2 {
+        return Err(Error::new(name, "size", format!("expected at least 2x2 samples, found {w}x{h}")));
+    }
+    match w.checked_mul(h) {
+        Some(n) if n <= options.max_samples && w.max(h) <= u64::from(u32::MAX) => Ok(n as usize),
+        _ => {
+            let limit = options.max_samples;
+            Err(Error::new(name, "size", format!("expected at most {limit} samples (--max-samples), found {w}x{h}")))
+        }
+    }
+}
+
+/// Bytes looked at to tell the format.
+pub(super) const HEAD_BYTES: u64 = 4096;
+
+/// A file format as told from content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Tiff,
+    Png,
+    Zip,
+    Gzip,
+    Asc,
+    UsgsDem,
+    /// The header of a `Bil`.
+    Header,
+    Bil,
+    Hgt,
+    Raw,
+    /// A picture format that holds no heights.
+    Picture(&'static str),
+    Unknown,
+}
+
+impl Kind {
+    /// Tells the format from a file's first bytes, its length, and whether a header lies beside it.
+    pub fn of(head: &[u8], len: u64, has_header: bool) -> Self {
+        match head {
+            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Kind::Tiff,
+            [0x89, b'P', b'N', b'G', ..] => Kind::Png,
+            [b'P', b'K', 3, 4, ..] => Kind::Zip,
+            [0x1f, 0x8b, 8, ..] => Kind::Gzip,
+            [0xff, 0xd8, 0xff, ..] => Kind::Picture("JPEG"),
+            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Kind::Picture("WebP"),
+            _ if bil::is_header(head) => Kind::Header,
+            _ if asc::is_header(head) => Kind::Asc,
+            _ if usgs_dem::is_header(head) => Kind::UsgsDem,
+            _ if has_header => Kind::Bil,
+            _ if hgt::side(len).is_some() => Kind::Hgt,
+            _ => Kind::Unknown,
+        }
+    }
+}
+
+/// Reads a source of a known format.
+pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+    match kind {
+        Kind::Tiff => geotiff::read(source, options),
+        Kind::Png => png::read(source, options),
+        Kind::Zip => archive::read_zip(source, options),
+        Kind::Gzip => archive::read_gzip(source, options),
+        Kind::Asc => asc::read(source, options),
+        Kind::UsgsDem => usgs_dem::read(source, options),
+        Kind::Header => Err(source.error("data", "expected a data file beside the header, found none")),
+        Kind::Bil => bil::read(source, options),
+        Kind::Hgt => hgt::read(source),
+        Kind::Raw => raw::read(source, options),
+        Kind::Picture(format) => Err(source.error("content", format!("expected heights, found a {format} picture"))),
+        Kind::Unknown => Err(source.error("content", raw::hint(source.len))),
+    }
+}

@@ -1,0 +1,278 @@
+//! What every loader yields, and the common way from there to a field.
+
+use super::{
+    Error, Field, Holes, Samples,
+    georef::Place,
+    load::{HoleFill, Loaded, Options},
+};
+
+/// Samples as a file stores them, before crop, holes and metres.
+pub(super) struct Raster {
+    /// Name of the file format.
+    pub format: &'static str,
+    /// How the file stores a sample.
+    pub sample_type: String,
+    /// Samples along (x, z).
+    pub size: [u32; 2],
+    /// The values, in the order of the file.
+    pub samples: Samples,
+    /// Samples that the file marks as missing otherwise than by a value.
+    pub holes: Holes,
+    /// The value that means "no data", times `step`.
+    pub nodata: Option<f64>,
+    /// Units a value counts.
+    pub step: f64,
+    /// Metres a unit.
+    pub unit: f64,
+    /// Where the samples lie once flipped.
+    pub place: Option<Place>,
+    /// Whether the file's columns run west and its rows north.
+    pub flip: [bool; 2],
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Raster {
+    /// Values in metres without holes or place.
+    pub fn new(format: &'static str, sample_type: &str, size: [u32; 2], samples: Samples) -> Self {
+        let holes = Holes::none(samples.len());
+        Self {
+            format,
+            sample_type: sample_type.to_owned(),
+            size,
+            samples,
+            holes,
+            nodata: None,
+            step: 1.0,
+            unit: 1.0,
+            place: None,
+            flip: [false; 2],
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Applies the wishes and makes the field.
+    pub fn finish(mut self, name: &str, options: &Options) -> Result<Loaded, Error> {
+        self.rearrange(name, options)?;
+        self.make_holes(options);
+        let range = self.check_range();
+        self.blank_holes(range);
+        self.samples = self.samples.compacted();
+        self.scale(name, options, range)?;
+        let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
+        let (spacing, origin) = self.lie(name, options)?;
+        let tiles = tiles(name, self.size, options)?;
+
+        let mut field = Field::new(self.samples, self.size, spacing, self.holes).tiled(tiles);
+        field.origin = origin;
+        field.crs = self.place.and_then(|place| place.crs);
+        if options.hole_fill == HoleFill::Interpolate {
+            field = field.without_holes();
+        }
+        let Self { format, sample_type, warnings, .. } = self;
+        Ok(Loaded { field, format, sample_type, exact_in_16_bit, warnings })
+    }
+
+    /// Crops, and turns the rows to run from north to south and the columns from west to east.
+    fn rearrange(&mut self, name: &str, options: &Options) -> Result<(), Error> {
+        let [w, h] = self.size;
+        let [x, z, crop_w, crop_h] = options.crop.unwrap_or([0, 0, w, h]);
+        let fits = |at: u32, n: u32, side: u32| n >= 2 && at.checked_add(n).is_some_and(|end| end <= side);
+        if !fits(x, crop_w, w) || !fits(z, crop_h, h) {
+            let what = format!("expected at least 2x2 samples within {w}x{h}, found {crop_w}x{crop_h} at {x},{z}");
+            return Err(Error::new(name, "--crop", what));
+        }
+        if [x, z, crop_w, crop_h] == [0, 0, w, h] && self.flip == [false; 2] {
+            return Ok(());
+        }
+        let source = |n: u32, side: u32, flip: bool| if flip { side - 1 - n } else { n } as usize;
+        let columns: Vec<usize> = (x..x + crop_w).map(|i| source(i, w, self.flip[0])).collect();
+        let rows = (z..z + crop_h).map(|j| source(j, h, self.flip[1]) * w as usize);
+        let order = rows.flat_map(|row| columns.iter().map(move |column| row + column));
+
+        let mut holes = Holes::none(crop_w as usize * crop_h as usize);
+        order.clone().enumerate().filter(|&(_, k)| self.holes.contains(k)).for_each(|(to, _)| holes.insert(to));
+        self.samples = match &self.samples {
+            Samples::F32(heights) => Samples::F32(order.map(|k| heights[k]).collect()),
+            &Samples::Coded { ref codes, zero, scale } => {
+                Samples::Coded { codes: order.map(|k| codes[k]).collect(), zero, scale }
+            }
+        };
+        self.holes = holes;
+        self.size = [crop_w, crop_h];
+        self.place = self.place.take().map(|place| place.moved([x, z]));
+        Ok(())
+    }
+
+    /// Makes holes of the nodata value, NaN and infinities.
+    fn make_holes(&mut self, options: &Options) {
+        // The nodata value is often rounded on its way through text: two units in the last place of an f32.
+        let nodata = options.nodata.or(self.nodata).map(|value| value / self.step);
+        let slack = nodata.map_or(0.0, |value| 2.0 * f64::from(f32::EPSILON) * value.abs());
+        let is_nodata =
+            |value: f32| nodata.is_some_and(|none| value == none as f32 || (f64::from(value) - none).abs() <= slack);
+        if nodata.is_none() && matches!(self.samples, Samples::Coded { .. }) {
+            return;
+        }
+        let mut bad = 0u64;
+        for k in 0..self.samples.len() {
+            let value = self.samples.height(k);
+            if is_nodata(value) {
+                self.holes.insert(k);
+            } else if !value.is_finite() {
+                bad += u64::from(!self.holes.contains(k));
+                self.holes.insert(k);
+            }
+        }
+        if bad > 0 && nodata.is_none_or(f64::is_finite) {
+            self.warnings.push(format!("{bad} samples are NaN or infinite and become holes"));
+        }
+    }
+
+    /// The lowest and highest value, with a warning about what looks like nodata.
+    fn check_range(&mut self) -> [f32; 2] {
+        let (mut low, mut high) = (Edge::default(), Edge::default());
+        for k in (0..self.samples.len()).filter(|&k| self.holes.count() == 0 || !self.holes.contains(k)) {
+            let value = self.samples.height(k);
+            low.add(value);
+            high.add(-value);
+        }
+        if low.count == 0 {
+            self.warnings.push("no sample has data".to_owned());
+            return [0.0, 0.0];
+        }
+        let (min, max) = (low.value, -high.value);
+        let looks_like_nodata = [(min, low.count, low.next, max), (max, high.count, -high.next, min)]
+            .into_iter()
+            .filter(|&(value, count, next, other)| {
+                let (gap, rest) = (distance(value, next), distance(next, other));
+                count > 1 && next.is_finite() && rest > 0.0 && gap > rest * if is_usual(value) { 0.25 } else { 4.0 }
+            });
+        for (value, count, next, _) in looks_like_nodata {
+            let (value, next) = (f64::from(value) * self.step, f64::from(next) * self.step);
+            self.warnings.push(format!(
+                "{count} samples are {value}, far from the next value {next}: undeclared nodata? --nodata {value} makes them holes"
+            ));
+        }
+        [min, max]
+    }
+
+    /// Gives samples under holes a value that is in range, so that they decide nothing.
+    fn blank_holes(&mut self, [min, _]: [f32; 2]) {
+        if let Samples::F32(heights) = &mut self.samples
+            && self.holes.count() > 0
+        {
+            let holes = &self.holes;
+            heights.iter_mut().enumerate().filter(|(k, _)| holes.contains(*k)).for_each(|(_, h)| *h = min);
+        }
+    }
+
+    /// Turns values into metres.
+    fn scale(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
+        let factor = (self.step * self.unit * options.height_scale.unwrap_or(1.0)) as f32;
+        if !factor.is_finite() || factor == 0.0 || range.iter().any(|value| !(value * factor).is_finite()) {
+            let what = format!("expected heights that stay finite, found {range:?} times {factor}");
+            return Err(Error::new(name, "--height-scale", what));
+        }
+        if factor != 1.0 {
+            self.samples.multiply(factor);
+        }
+        Ok(())
+    }
+
+    /// Spacing and origin, metres.
+    fn lie(&self, name: &str, options: &Options) -> Result<([f64; 2], [f64; 2]), Error> {
+        let (spacing, origin) = match &self.place {
+            Some(place) => place.spacing_and_origin(self.size[1]),
+            None => ([1.0; 2], [0.0; 2]),
+        };
+        let spacing = options.spacing.unwrap_or(spacing);
+        // Positions are f64 metres and become f32 about the eye: both ends far beyond any planet.
+        if spacing.iter().any(|s| !(1e-6..=1e9).contains(s)) || origin.iter().any(|o| !(o.abs() <= 1e12)) {
+            let what = format!("expected a spacing of 1e-6 to 1e9 m, found {spacing:?} m at {origin:?} m");
+            return Err(Error::new(name, "spacing", what));
+        }
+        Ok((spacing, origin))
+    }
+}
+
+/// How often the field repeats.
+fn tiles(name: &str, [w, h]: [u32; 2], options: &Options) -> Result<[u32; 2], Error> {
+    let [nx, nz] = options.tiles.unwrap_or([1, 1]);
+    // Lattice coordinates are i32 in places.
+    let fits = |n: u32, side: u32| n > 0 && n.checked_mul(side).is_some_and(|n| n <= i32::MAX as u32);
+    match fits(nx, w) && fits(nz, h) {
+        true => Ok([nx, nz]),
+        false => {
+            Err(Error::new(name, "--tile", format!("expected at most 2^31 samples a side, found {nx}x{nz} tiles")))
+        }
+    }
+}
+
+/// The lowest value, how often it occurs, and the lowest value above it.
+struct Edge {
+    value: f32,
+    count: u64,
+    next: f32,
+}
+
+impl Default for Edge {
+    fn default() -> Self {
+        Self { value: f32::INFINITY, count: 0, next: f32::INFINITY }
+    }
+}
+
+impl Edge {
+    #[inline]
+    fn add(&mut self, value: f32) {
+        if value > self.value {
+            self.next = self.next.min(value);
+        } else if value < self.value {
+            *self = Self { value, count: 1, next: self.value };
+        } else {
+            self.count += 1;
+        }
+    }
+}
+
+fn distance(a: f32, b: f32) -> f64 {
+    (f64::from(a) - f64::from(b)).abs()
+}
+
+/// Whether a value is one that programs like to mean "no data".
+fn is_usual(value: f32) -> bool {
+    const USUAL: [f32; 8] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -99999.0, -999.0, 9999.0];
+    USUAL.contains(&value) || value.abs() > 1e30
+}
+
+impl Samples {
+    /// The same heights as 16-bit codes where that loses nothing: all are whole multiples of 2^-k metres for
+    /// some k of 0..=8, and span no more than 65535 of them.
+    pub fn compacted(self) -> Self {
+        let Samples::F32(heights) = self else { return self };
+        match compact_scale(&heights) {
+            Some((low, scale)) => {
+                let codes = heights.iter().map(|&h| (f64::from(h) / scale - low) as u16).collect();
+                Samples::Coded { codes, zero: -low as f32, scale: scale as f32 }
+            }
+            None => Samples::F32(heights),
+        }
+    }
+}
+
+/// The lowest height in multiples of the scale, and the scale, of codes that hold all heights.
+fn compact_scale(heights: &[f32]) -> Option<(f64, f64)> {
+    let (mut min, mut max, mut finest) = (f64::INFINITY, f64::NEG_INFINITY, 1.0f64);
+    for height in heights.iter().map(|&h| f64::from(h)) {
+        while (height * finest).fract() != 0.0 {
+            finest *= 2.0;
+            if !(finest <= 256.0) || !height.is_finite() {
+                return None;
+            }
+        }
+        (min, max) = (min.min(height), max.max(height));
+    }
+    let (low, high) = (min * finest, max * finest);
+    let exact = f64::from(1 << 24);
+    (high - low <= 65535.0 && low.abs() <= exact && high.abs() <= exact).then_some((low, 1.0 / finest))
+}

@@ -1,0 +1,110 @@
+//! Heights encoded in the colours of a picture: Terrarium and Mapbox Terrain-RGB.
+
+use std::{io::Cursor, str::FromStr};
+
+use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbaImage};
+
+use super::{
+    Error, Holes, Samples,
+    load::{self, Options, Source},
+    raster::Raster,
+};
+
+/// How a colour means a height.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// R · 256 + G + B / 256 − 32768 metres.
+    Terrarium,
+    /// −10000 + (R · 65536 + G · 256 + B) · 0.1 metres.
+    Mapbox,
+}
+
+impl FromStr for Encoding {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "terrarium" => Ok(Encoding::Terrarium),
+            "mapbox" => Ok(Encoding::Mapbox),
+            _ => Err(format!("expected terrarium|mapbox, found {text:?}")),
+        }
+    }
+}
+
+impl Encoding {
+    /// Metres a value counts.
+    pub(super) fn step(self) -> f64 {
+        match self {
+            Encoding::Terrarium => 1.0,
+            Encoding::Mapbox => 0.1,
+        }
+    }
+
+    /// As in `sample_type`.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Encoding::Terrarium => "terrarium rgb",
+            Encoding::Mapbox => "mapbox rgb",
+        }
+    }
+
+    /// The value of a colour in steps of [`Self::step`]; exact, for it has 24 bits.
+    fn value(self, [r, g, b]: [u8; 3]) -> f32 {
+        let number = i32::from(r) << 16 | i32::from(g) << 8 | i32::from(b);
+        match self {
+            Encoding::Terrarium => (number - (32768 << 8)) as f32 / 256.0,
+            Encoding::Mapbox => (number - 100_000) as f32,
+        }
+    }
+
+    /// Stores pixels of 3 or 4 bytes as samples `at..`; where alpha is 0 there is no data.
+    pub(super) fn store(self, pixels: &[u8], channels: usize, heights: &mut [f32], holes: &mut Holes, at: usize) {
+        for (k, pixel) in (at..heights.len()).zip(pixels.chunks_exact(channels)) {
+            heights[k] = self.value([pixel[0], pixel[1], pixel[2]]);
+            if pixel.get(3) == Some(&0) {
+                holes.insert(k);
+            }
+        }
+    }
+}
+
+/// The encoding asked for, or an error that tells how to ask.
+pub(super) fn asked(name: &str, options: &Options) -> Result<Encoding, Error> {
+    let what = "found a colour picture, which could mean several things: give --encoding terrarium|mapbox";
+    options.encoding.ok_or_else(|| Error::new(name, "content", what))
+}
+
+/// Reads a colour picture that encodes heights.
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+    let encoding = asked(source.name, options)?;
+    let picture = decode(source.name, &mut source.reader, options)?;
+    let (w, h) = picture.dimensions();
+    let count = source.samples([w, h].map(u64::from), options)?;
+    let (mut heights, mut holes) = (vec![0.0; count], Holes::none(count));
+    encoding.store(picture.as_raw(), 4, &mut heights, &mut holes, 0);
+    let mut raster = Raster::new("PNG", encoding.name(), [w, h], Samples::F32(heights));
+    raster.holes = holes;
+    raster.step = encoding.step();
+    Ok(raster)
+}
+
+/// Reads a tile.
+pub(super) fn decode_bytes(name: &str, bytes: &[u8], options: &Options) -> Result<RgbaImage, Error> {
+    decode(name, Cursor::new(bytes), options)
+}
+
+fn decode(name: &str, reader: impl load::Input, options: &Options) -> Result<RgbaImage, Error> {
+    let error = |e: &dyn std::fmt::Display| Error::new(name, "picture", e);
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(options.max_samples.saturating_mul(8).max(1 << 20));
+    let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|e| error(&e))?;
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|e| error(&e))?;
+    let (w, h) = decoder.dimensions();
+    load::samples(name, [w, h].map(u64::from), options)?;
+    match decoder.color_type() {
+        ColorType::Rgb8 | ColorType::Rgba8 | ColorType::L8 | ColorType::La8 => (),
+        other => return Err(error(&format!("expected 8 bits a channel, found {other:?}"))),
+    }
+    Ok(DynamicImage::from_decoder(decoder).map_err(|e| error(&e))?.into_rgba8())
+}
