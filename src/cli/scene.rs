@@ -319,10 +319,10 @@ impl ViewArgs {
             None => whole.eye,
         };
         let world_from_eye = match (&self.look, self.yaw, self.pitch) {
-            (Some(text), _, _) => {
-                View::looking_along(position("--look", text, field)? - eye) * View::rolled(self.roll)
+            (Some(text), _, _) => View::looking_along(position("--look", text, field)? - eye) * View::rolled(self.roll),
+            (None, None, None) if self.eye.is_none() => {
+                View::looking_along(whole.centre - eye) * View::rolled(self.roll)
             }
-            (None, None, None) if self.eye.is_none() => View::looking_along(whole.centre - eye) * View::rolled(self.roll),
             (None, yaw, pitch) => View::turned(yaw.unwrap_or(-90.0), pitch.unwrap_or(0.0), self.roll),
         };
         let above = eye.y - field.height_at(eye.x, eye.z).unwrap_or(whole.centre.y);

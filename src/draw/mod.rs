@@ -160,7 +160,9 @@ impl DrawList {
     pub fn commands(&self) -> usize {
         match self.submission {
             Submission::Direct => self.draws.len(),
-            Submission::Indirect => self.draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)).count(),
+            Submission::Indirect => {
+                self.draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)).count()
+            }
         }
     }
 

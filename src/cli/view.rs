@@ -1,0 +1,1 @@
+//! `cuesta view`: the window.
