@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde::Serialize;
 
-use super::scene::{LookArgs, TechniqueArgs, TerrainArgs};
+use super::scene::{LookArgs, ReadArgs, TechniqueArgs};
 use super::{Common, Outcome, report};
 use crate::height::Loaded;
 use crate::plan::{Decision, DeviceLimits, ScenePlan};
@@ -12,9 +12,12 @@ use crate::plan::{Decision, DeviceLimits, ScenePlan};
 /// Arguments.
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// Where heights come from.
+    /// A height file of any supported format, a directory of web-map tiles, or `demo`.
+    #[arg(required_unless_present = "devices")]
+    pub terrain: Option<String>,
+    /// How heights are read.
     #[command(flatten)]
-    pub terrain: Option<TerrainArgs>,
+    pub reading: ReadArgs,
     /// What this scene needs on the device, and what it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
@@ -98,7 +101,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     let Some(terrain) = &args.terrain else {
         bail!("info: expected a terrain or --devices");
     };
-    let loaded = terrain.load(common)?;
+    let loaded = args.reading.load(common, terrain)?;
     if !args.plan {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);

@@ -114,7 +114,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         return Err(Error::new(output, "extension", "expected .png").into());
     }
     let field = Arc::new(args.terrain.load(common)?.field);
-    let (look, overlay) = args.look.build(&args.terrain)?;
+    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let prepared = Instant::now();
     let mut technique = args.technique.build(common, &field)?;

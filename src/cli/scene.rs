@@ -13,11 +13,19 @@ use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Look};
 use crate::view::{Lens, Metric, Tolerance, View};
 
-/// Where heights come from and how they are read.
+/// Where heights come from.
 #[derive(Args, Debug, Clone)]
 pub struct TerrainArgs {
     /// A height file of any supported format, a directory of web-map tiles, or `demo`.
     pub terrain: String,
+    /// How they are read.
+    #[command(flatten)]
+    pub reading: ReadArgs,
+}
+
+/// How heights are read.
+#[derive(Args, Debug, Clone)]
+pub struct ReadArgs {
     /// Distance of neighbouring samples, metres, instead of what the file says.
     #[arg(long, value_name = "DX[,DZ]", value_parser = pair_or_one)]
     pub spacing: Option<[f64; 2]>,
@@ -193,9 +201,9 @@ fn encoding(text: &str) -> Result<Encoding, String> {
     }
 }
 
-impl TerrainArgs {
-    /// Reads the field, and says what the reader warns of.
-    pub fn load(&self, common: &Common) -> Result<Loaded> {
+impl ReadArgs {
+    /// Reads a field, and says what the reader warns of.
+    pub fn load(&self, common: &Common, terrain: &str) -> Result<Loaded> {
         let options = Options {
             spacing: self.spacing,
             height_scale: self.height_scale,
@@ -208,22 +216,29 @@ impl TerrainArgs {
             zoom: self.zoom,
             max_samples: self.max_samples,
         };
-        let _spinner = report::spinner(common, format!("reading {}", self.terrain));
-        let loaded = if self.is_demo() {
+        let _spinner = report::spinner(common, format!("reading {terrain}"));
+        let loaded = if is_demo(terrain) {
             load_bytes("demo", demo::PICTURE, &demo_options(options))?
         } else {
-            load(Path::new(&self.terrain), &options)?
+            load(Path::new(terrain), &options)?
         };
         for warning in &loaded.warnings {
             report::warn(common, warning);
         }
         Ok(loaded)
     }
+}
 
-    /// Whether it is the embedded terrain, which has an overlay of its own.
-    pub fn is_demo(&self) -> bool {
-        self.terrain == "demo" && !Path::new("demo").exists()
+impl TerrainArgs {
+    /// Reads the field, and says what the reader warns of.
+    pub fn load(&self, common: &Common) -> Result<Loaded> {
+        self.reading.load(common, &self.terrain)
     }
+}
+
+/// Whether it is the embedded terrain, which has an overlay of its own.
+fn is_demo(terrain: &str) -> bool {
+    terrain == "demo" && !Path::new(terrain).exists()
 }
 
 /// What the embedded picture's pixels mean, unless the user says otherwise.
@@ -238,7 +253,7 @@ fn demo_options(options: Options) -> Options {
 
 impl LookArgs {
     /// The look, and the picture it lays over the field.
-    pub fn build(&self, terrain: &TerrainArgs) -> Result<(Look, Option<image::RgbaImage>)> {
+    pub fn build(&self, terrain: &str) -> Result<(Look, Option<image::RgbaImage>)> {
         let colour = match (self.colour, &self.overlay) {
             (Some(ColourArg::Height), _) => Colour::Height,
             (Some(ColourArg::Level), _) => Colour::Level,
@@ -246,12 +261,12 @@ impl LookArgs {
             (Some(ColourArg::Normal), _) => Colour::Normal,
             (Some(ColourArg::Batch), _) => Colour::Batch,
             (Some(ColourArg::Overlay), _) | (None, Some(_)) => Colour::Overlay,
-            (None, None) if terrain.is_demo() => Colour::Overlay,
+            (None, None) if is_demo(terrain) => Colour::Overlay,
             (None, None) => Colour::Height,
         };
         let picture = match (&self.overlay, colour) {
             (Some(path), Colour::Overlay) => Some(read_picture(path)?),
-            (None, Colour::Overlay) if terrain.is_demo() => {
+            (None, Colour::Overlay) if is_demo(terrain) => {
                 Some(image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8())
             }
             (None, Colour::Overlay) => bail!("--colour overlay: no picture given, expected --overlay IMG"),

@@ -127,6 +127,7 @@ fn missing_features(instance: &Instance, raw: vk::PhysicalDevice) -> Vec<String>
         (v12.host_query_reset, "hostQueryReset"),
         (v13.dynamic_rendering, "dynamicRendering"),
         (v13.synchronization2, "synchronization2"),
+        (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
     ]
     .into_iter()
     .filter(|(has, _)| *has == vk::FALSE)
@@ -165,7 +166,10 @@ impl Gpu {
             .fill_mode_non_solid(true)
             .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
-        let mut v13 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .shader_demote_to_helper_invocation(true);
         let extensions: &[_] = if window { &[khr::swapchain::NAME.as_ptr()] } else { &[] };
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)

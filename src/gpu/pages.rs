@@ -135,18 +135,34 @@ fn upload(
     })
 }
 
-/// A sampler that filters linearly; coordinates beyond the edge repeat or clamp.
-pub fn sampler(gpu: &Gpu, repeat: bool) -> Result<vk::Sampler> {
-    let mode = if repeat { vk::SamplerAddressMode::REPEAT } else { vk::SamplerAddressMode::CLAMP_TO_EDGE };
+/// How an image is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampling {
+    /// Single texels.
+    Texels,
+    /// Linear, the edge texel beyond the edge.
+    Clamped,
+    /// Linear, repeating.
+    Repeated,
+}
+
+/// A sampler; the owner destroys it.
+pub fn sampler(gpu: &Gpu, sampling: Sampling) -> Result<vk::Sampler> {
+    let (filter, mode, name) = match sampling {
+        Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
+        Sampling::Clamped => (vk::Filter::LINEAR, vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
+        Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerAddressMode::REPEAT, "repeating sampler"),
+    };
     let info = vk::SamplerCreateInfo::default()
-        .mag_filter(vk::Filter::LINEAR)
-        .min_filter(vk::Filter::LINEAR)
+        .mag_filter(filter)
+        .min_filter(filter)
+        .mipmap_mode(vk::SamplerMipmapMode::LINEAR)
         .address_mode_u(mode)
         .address_mode_v(mode)
         .address_mode_w(mode)
         .max_lod(vk::LOD_CLAMP_NONE);
-    // SAFETY: the device is alive; the owner destroys the sampler.
+    // SAFETY: the device is alive.
     let sampler = unsafe { gpu.raw.create_sampler(&info, None) }?;
-    gpu.name(sampler, if repeat { "repeating sampler" } else { "clamping sampler" });
+    gpu.name(sampler, name);
     Ok(sampler)
 }

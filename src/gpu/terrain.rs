@@ -9,7 +9,7 @@ use bytemuck::cast_slice;
 use super::device::Gpu;
 use super::frames::{Recording, SLOTS, once};
 use super::memory::{Buffer, Image, memory_barrier};
-use super::pages;
+use super::pages::{self, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
 use crate::draw::layout::{ExplicitVertex, Frame, Instance};
@@ -25,7 +25,7 @@ pub struct Terrain {
     resident: Resident,
     slots: Vec<Slot>,
     descriptors: vk::DescriptorPool,
-    samplers: [vk::Sampler; 2],
+    samplers: [vk::Sampler; 3],
     _images: [Image; 3],
 }
 
@@ -63,7 +63,18 @@ impl Terrain {
         let pipelines = Pipelines::new(gpu, plan, formats)?;
         let images =
             [pages::heights(gpu, plan, field)?, pages::holes(gpu, plan, field)?, pages::overlay(gpu, overlay)?];
-        let samplers = [pages::sampler(gpu, plan.tiled)?, pages::sampler(gpu, false)?];
+        let heights = if !plan.filtered {
+            Sampling::Texels
+        } else if plan.tiled {
+            Sampling::Repeated
+        } else {
+            Sampling::Clamped
+        };
+        let samplers = [
+            pages::sampler(gpu, heights)?,
+            pages::sampler(gpu, Sampling::Texels)?,
+            pages::sampler(gpu, Sampling::Clamped)?,
+        ];
         let descriptors = descriptor_pool(gpu)?;
         let layouts = [pipelines.set_layout; SLOTS];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&layouts);
@@ -267,13 +278,12 @@ impl Slot {
         })
     }
 
-    fn describe(&self, gpu: &Gpu, images: &[Image; 3], [heights, clamping]: [vk::Sampler; 2]) {
+    fn describe(&self, gpu: &Gpu, images: &[Image; 3], samplers: [vk::Sampler; 3]) {
         let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-        let sampled = [heights, clamping, clamping];
         let infos: Vec<_> = images
             .iter()
-            .zip(sampled)
+            .zip(samplers)
             .map(|(image, sampler)| [vk::DescriptorImageInfo { sampler, image_view: image.view, image_layout: layout }])
             .collect();
         let write = vk::WriteDescriptorSet::default().dst_set(self.set);

@@ -9,7 +9,7 @@ use gpu_allocator::MemoryLocation;
 use super::device::Gpu;
 use super::frames::once;
 use super::memory::{Buffer, memory_barrier};
-use super::pages;
+use super::pages::{self, Sampling};
 use super::shaders::{self, Constants};
 use crate::draw::layout::{ExplicitVertex, Frame, Instance};
 use crate::height::Field;
@@ -36,7 +36,7 @@ pub fn positions(
     queries: &[Query],
 ) -> Result<Vec<[f32; 3]>> {
     let heights = pages::heights(gpu, plan, field)?;
-    let sampler = pages::sampler(gpu, false)?;
+    let sampler = pages::sampler(gpu, Sampling::Texels)?;
     let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
     let mut uniform = Buffer::host(gpu, "frame", size_of::<Frame>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER)?;
     uniform.write(0, bytemuck::bytes_of(frame));
