@@ -148,15 +148,19 @@ pub enum Sampling {
 
 /// A sampler; the owner destroys it.
 pub fn sampler(gpu: &Gpu, sampling: Sampling) -> Result<vk::Sampler> {
-    let (filter, mode, name) = match sampling {
-        Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
-        Sampling::Clamped => (vk::Filter::LINEAR, vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
-        Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerAddressMode::REPEAT, "repeating sampler"),
+    let (filter, mipmap) = match sampling {
+        Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),
+        Sampling::Clamped | Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
+    };
+    let (mode, name) = match sampling {
+        Sampling::Texels => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
+        Sampling::Clamped => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
+        Sampling::Repeated => (vk::SamplerAddressMode::REPEAT, "repeating sampler"),
     };
     let info = vk::SamplerCreateInfo::default()
         .mag_filter(filter)
         .min_filter(filter)
-        .mipmap_mode(vk::SamplerMipmapMode::LINEAR)
+        .mipmap_mode(mipmap)
         .address_mode_u(mode)
         .address_mode_v(mode)
         .address_mode_w(mode)
