@@ -7,6 +7,8 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 /// A rectangle of square cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
@@ -17,7 +19,7 @@ pub struct Grid {
 }
 
 /// Offsets of the eight neighbours and their distance in cells.
-const NEIGHBOURS: [(isize, isize, f64); 8] = {
+const NEIGHBOURS: [(i32, i32, f64); 8] = {
     const DIAGONAL: f64 = std::f64::consts::SQRT_2;
     [
         (-1, -1, DIAGONAL),
@@ -43,6 +45,11 @@ impl Grid {
         i == 0 || j == 0 || i + 1 == self.size[0] || j + 1 == self.size[1]
     }
 
+    /// A value of each cell; on all cores, as none depends on another.
+    pub fn map(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> Vec<f64> {
+        (0..self.len()).into_par_iter().map(value).collect()
+    }
+
     /// Distance of two cells, metres.
     pub fn distance(&self, a: usize, b: usize) -> f64 {
         let w = self.size[0];
@@ -51,12 +58,14 @@ impl Grid {
     }
 
     /// The neighbours of cell `k` and their distance, metres.
+    #[inline]
     pub fn neighbours(self, k: usize) -> impl Iterator<Item = (usize, f64)> {
-        let [w, h] = self.size.map(|n| n as isize);
-        let (i, j) = (k as isize % w, k as isize / w);
-        NEIGHBOURS.iter().filter_map(move |&(di, dj, d)| {
-            let inside = (0..w).contains(&(i + di)) && (0..h).contains(&(j + dj));
-            inside.then(|| ((k as isize + dj * w + di) as usize, d * self.spacing))
+        let [w, h] = self.size.map(|n| n as u32);
+        let (i, j) = (k as u32 % w, k as u32 / w);
+        NEIGHBOURS.iter().filter_map(move |&(di, dj, distance)| {
+            // Left of 0 wraps to beyond the width.
+            let (i, j) = (i.wrapping_add_signed(di), j.wrapping_add_signed(dj));
+            (i < w && j < h).then(|| (j as usize * w as usize + i as usize, distance * self.spacing))
         })
     }
 }
@@ -117,6 +126,7 @@ impl Flow {
     }
 
     /// The cells that `k` drains to, with their share (the shares sum to 1) and distance; none on the border.
+    #[inline]
     pub fn receivers(&self, grid: Grid, k: usize) -> Receivers {
         let mut out = Receivers { cells: [(0, 0.0, 0.0); 8], count: 0 };
         if self.parent[k] as usize == k {
