@@ -156,7 +156,8 @@ fn write_tiff(field: &Field, out: &mut Out) -> io::Result<()> {
 fn write_image<K: TiffKind>(field: &Field, tiff: TiffEncoder<&mut Out, K>) -> tiff::TiffResult<()> {
     let mark = hole_mark(field);
     let short = |h: f32| h.fract() == 0.0 && (-32768.0..=32767.0).contains(&h);
-    if short(mark) && heights(field).all(short) {
+    let holes_fit = field.holes().count() == 0 || short(mark);
+    if holes_fit && heights(field).all(short) {
         let tiff = tiff.with_predictor(Predictor::Horizontal);
         write_rows::<GrayI16, K>(field, mark, tiff, |h| h as i16)
     } else {
@@ -185,7 +186,7 @@ where
     if field.holes().count() > 0 {
         directory.write_tag(Tag::GdalNodata, mark.to_string().as_str())?;
     }
-    // Whole, as strips written one by one are not compressed: https://github.com/image-rs/image-tiff 0.11.3.
+    // Whole: tiff 0.11.3 leaves strips written one by one uncompressed, and names them compressed.
     let values: Vec<_> = (0..h).flat_map(|j| row(field, j, mark)).map(value).collect();
     image.write_data(&values)
 }
