@@ -105,7 +105,7 @@ impl Rock {
     /// lines of the coarse grid, with a little noise for new gullies to start from.
     fn refine(&self, grid: Grid, coarse: Grid, height: &[f64]) -> Vec<f64> {
         let [w, h] = coarse.size;
-        let salt = self.seed ^ (grid.len() as u64) << 8;
+        let salt = self.seed ^ (grid.cells() as u64) << 8;
         let fine = |k: usize| {
             let [i, j] = [k % grid.size[0], k / grid.size[0]];
             let [x, z] = noise::warped([i as f64 / 9.0, j as f64 / 9.0], 0.28, salt).map(|t| t * 4.5);

@@ -35,7 +35,7 @@ const NEIGHBOURS: [(i32, i32, f64); 8] = {
 
 impl Grid {
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub fn cells(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
@@ -47,7 +47,7 @@ impl Grid {
 
     /// A value of each cell; on all cores, as none depends on another.
     pub fn map(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> Vec<f64> {
-        (0..self.len()).into_par_iter().map(value).collect()
+        (0..self.cells()).into_par_iter().map(value).collect()
     }
 
     /// Distance of two cells, metres.
@@ -105,10 +105,13 @@ impl Flow {
     /// plains of rubble.
     pub fn new(grid: Grid, height: &[f64], slope: f64) -> Self {
         const UNSEEN: u32 = u32::MAX;
-        let mut flow =
-            Self { order: Vec::with_capacity(grid.len()), level: height.to_vec(), parent: vec![UNSEEN; grid.len()] };
+        let mut flow = Self {
+            order: Vec::with_capacity(grid.cells()),
+            level: height.to_vec(),
+            parent: vec![UNSEEN; grid.cells()],
+        };
         let mut shore = BinaryHeap::new();
-        for k in (0..grid.len()).filter(|&k| grid.is_border(k)) {
+        for k in (0..grid.cells()).filter(|&k| grid.is_border(k)) {
             flow.parent[k] = k as u32;
             shore.push(Reverse(Shore { level: height[k], cell: k as u32 }));
         }
@@ -154,7 +157,7 @@ impl Flow {
 
     /// Area drained through each cell, its own included, m².
     pub fn area(&self, grid: Grid) -> Vec<f64> {
-        let mut area = vec![grid.spacing * grid.spacing; grid.len()];
+        let mut area = vec![grid.spacing * grid.spacing; grid.cells()];
         for &k in self.order.iter().rev() {
             for &(n, share, _) in self.receivers(grid, k as usize).iter() {
                 area[n] += area[k as usize] * share;

@@ -54,7 +54,7 @@ impl Ground {
         let [w, h] = field.stored().map(|n| n as usize);
         let grid = Grid { size: [w, h], spacing: field.spacing[0] };
         let height = grid.map(|k| f64::from(field.samples().height(k)));
-        let gradient: Vec<[f64; 2]> = (0..grid.len()).map(|k| gradient(field, &height, k)).collect();
+        let gradient: Vec<[f64; 2]> = (0..grid.cells()).map(|k| gradient(field, &height, k)).collect();
         let slope: Vec<f64> = gradient.iter().map(|[x, z]| (x * x + z * z).sqrt()).collect();
         let statistics = field.statistics();
         let (low, range) = (f64::from(statistics.min), f64::from(statistics.max - statistics.min).max(1.0));
@@ -94,7 +94,7 @@ impl Ground {
         colour = mix(colour, SCREE, step(0.50, 0.62, height + 0.1 * (slope - 0.6)));
         colour = mix(colour, ROCK, step(0.90, 1.30, slope + 0.5 * (height - 0.5)) * step(0.2, 0.4, height));
         let snow = height + 0.05 * self.at(&self.north, place) + 0.0025 * hollow;
-        colour = mix(colour, SNOW, step(0.55, 0.62, snow) * (1.0 - step(1.0, 1.35, slope - 0.8 * (height - 0.7))));
+        colour = mix(colour, SNOW, step(0.54, 0.60, snow) * (1.0 - step(1.05, 1.35, slope - 0.8 * (height - 0.7))));
         colour = colour.map(|c| c * (1.0 + 0.07 * fine - (0.004 * hollow).clamp(-0.06, 0.10)));
 
         let river = self.at(&self.river, place);
@@ -129,9 +129,9 @@ fn blur(grid: Grid, values: &[f64]) -> Vec<f64> {
 fn lakes(grid: Grid, height: &[f64]) -> Vec<f64> {
     const SMALLEST: usize = 500;
     let level = |k: usize| grid.neighbours(k).all(|(n, _)| height[n] == height[k]);
-    let mut lake: Vec<f64> = vec![0.0; grid.len()];
-    let mut seen = vec![false; grid.len()];
-    for start in 0..grid.len() {
+    let mut lake: Vec<f64> = vec![0.0; grid.cells()];
+    let mut seen = vec![false; grid.cells()];
+    for start in 0..grid.cells() {
         let mut found = Vec::new();
         let mut next = vec![start];
         while let Some(k) = next.pop() {
