@@ -156,6 +156,7 @@ pub fn views(field: &Field) -> Vec<(&'static str, View)> {
     let (corner, far) = (at(-0.1, 1.1, 0.0) + DVec3::Y * extent / 3.0, middle + DVec3::new(7.0, 4.0, -9.0) * extent);
     let above = middle + DVec3::Y * extent;
     let under = DVec3::new(middle.x, f64::from(range.min) - extent / 5.0, middle.z);
+    let over = DVec3::new(middle.x, f64::from(range.max) + extent, middle.z);
     vec![
         ("inside", pinhole(at(0.45, 0.55, extent / 40.0), View::turned(30.0, -10.0, 0.0), 90.0)),
         ("on a vertex", pinhole(at(0.5, 0.5, 0.0), View::turned(200.0, 0.0, 0.0), 60.0)),
@@ -166,7 +167,7 @@ pub fn views(field: &Field) -> Vec<(&'static str, View)> {
         ("5°", pinhole(corner, towards(corner), 5.0)),
         ("120°, upside down", pinhole(at(0.2, 0.3, extent / 15.0), View::turned(45.0, -30.0, 180.0), 120.0)),
         ("orthographic", orthographic(corner, towards(corner), extent / 2.0)),
-        ("orthographic, all", orthographic(above, View::turned(-90.0, -90.0, 0.0), 3.0 * extent)),
+        ("orthographic, all", orthographic(over, View::turned(-90.0, -90.0, 0.0), 3.0 * extent)),
         ("away from it", pinhole(far, View::looking_along(far - middle), 60.0)),
     ]
 }
@@ -191,4 +192,12 @@ pub fn sees_everything(field: &Field, view: &View) -> bool {
         max: field.world_at(w, h, range.max.into()),
     };
     view.frustum().contains(&bounds) == Containment::Inside
+}
+
+#[test]
+fn every_field_is_once_seen_whole_and_once_in_part() {
+    for (name, field) in fields() {
+        let whole = views(&field).iter().filter(|(_, view)| sees_everything(&field, view)).count();
+        assert!((1..8).contains(&whole), "{name}: seen whole in {whole} views");
+    }
 }
