@@ -80,7 +80,7 @@ pub struct Proof {
     pub border_edges: usize,
 }
 
-/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 200 bytes a triangle
+/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 100 bytes a triangle
 /// while it runs.
 pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Proof, Box<CounterExample>> {
     on_the_field(field, triangles)?;
