@@ -56,8 +56,19 @@ fn report() {
                 let s = l.field.statistics();
                 println!(
                     "{file}: {} {} {:?} {}..{} mean {:.2} holes {} spacing {:?} origin {:?} {:?} exact16 {} {:?} {:?}",
-                    l.format, l.sample_type, l.field.size(), s.min, s.max, s.mean, l.field.holes().count(),
-                    l.field.spacing, l.field.origin, l.field.crs, l.exact_in_16_bit, l.warnings, start.elapsed()
+                    l.format,
+                    l.sample_type,
+                    l.field.size(),
+                    s.min,
+                    s.max,
+                    s.mean,
+                    l.field.holes().count(),
+                    l.field.spacing,
+                    l.field.origin,
+                    l.field.crs,
+                    l.exact_in_16_bit,
+                    l.warnings,
+                    start.elapsed()
                 );
             }
         }
