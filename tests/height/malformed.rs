@@ -142,3 +142,16 @@ fn errors_say_what_to_do() {
         assert!(words.all(|word| error.contains(word)), "{error}");
     }
 }
+
+/// Writes the tiny files as seeds of the fuzz target (`fuzz/fuzz_targets/load.rs` says how they are read).
+#[test]
+#[ignore = "writes fuzz/seeds"]
+fn write_seeds() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds");
+    std::fs::create_dir_all(&folder).unwrap();
+    for file in tiny::all() {
+        let wish = u8::from(file.options.raw.is_some()) | u8::from(file.options.encoding.is_some()) << 1;
+        let hdr = file.hdr.map(|hdr| [b"\xffH", hdr.as_slice()].concat()).unwrap_or_default();
+        std::fs::write(folder.join(file.name), [vec![wish], file.bytes, hdr].concat()).unwrap();
+    }
+}
