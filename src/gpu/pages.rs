@@ -70,7 +70,7 @@ fn paged(
     let layers = columns * rows;
     let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
     let image = Image::new(gpu, ImageInfo { purpose, size, layers: Some(layers), format, usage })?;
-    let stored = plan.stored();
+    let stored = plan.stored;
     upload(gpu, &image, layers, size, u64::from(size[0]) * texel, |layer, y, count, staging| {
         let corner = [layer % columns * size[0], layer / columns * size[1]];
         for z in corner[1] + y..corner[1] + y + count {
