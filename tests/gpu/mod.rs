@@ -65,7 +65,8 @@ fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view
 /// Mountains with a hole, 16-bit, not square.
 fn mountains() -> Arc<Field> {
     let land = synth::synth(synth::Kind::Fractal, [131, 97], 5);
-    let samples = land.samples().clone();
+    let codes = (0..land.samples().len()).map(|k| (land.samples().height(k) * 10.0).round() as u16).collect();
+    let samples = Samples::Coded { codes, zero: 0.0, scale: 0.1 };
     let mut holes = Holes::none(samples.len());
     for (j, i) in (30..45).flat_map(|j| (60..85).map(move |i| (j, i))) {
         holes.insert(j * 131 + i);
