@@ -360,26 +360,38 @@ impl ViewArgs {
 pub struct Whole {
     /// Its centre at mean height.
     pub centre: DVec3,
-    /// Half its diagonal in plan, metres.
+    /// Half its diagonal, metres.
     pub radius: f64,
     /// From where all of it is seen, from the south and above.
     pub eye: DVec3,
 }
 
 impl Whole {
-    /// The view of a whole field for a field of view in degrees.
+    /// The view of a whole field for a horizontal field of view in degrees.
     pub fn of(field: &Field, fov: f64, size: [u32; 2]) -> Self {
         let statistics = field.statistics();
-        let [w, h] = field.size().map(f64::from);
-        let centre = field.world_at((w - 1.0) / 2.0, (h - 1.0) / 2.0, statistics.mean);
-        let extent = field.world_at(w - 1.0, h - 1.0, statistics.mean) - field.world_at(0.0, 0.0, statistics.mean);
-        let radius = extent.x.hypot(extent.z) / 2.0;
-        // The picture's smaller half-angle sees the radius, seen from the side as it is, with some air.
-        let slope = (fov.to_radians() / 2.0).tan();
-        let upright = slope * f64::from(size[1]) / f64::from(size[0]);
-        let distance = (extent.x.max(extent.z * 0.6) / 2.0 / slope).max(radius * 0.55 / upright) * 1.15;
-        let direction = DVec3::new(0.35, 0.62, 1.0).normalize_or(DVec3::Y);
-        Self { centre, radius, eye: centre + direction * distance }
+        let [w, h] = field.size().map(|n| f64::from(n - 1));
+        let centre = field.world_at(w / 2.0, h / 2.0, statistics.mean);
+        let corners: Vec<_> = [statistics.min, statistics.max]
+            .into_iter()
+            .flat_map(|y| [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(i, j)| field.world_at(i, j, f64::from(y))))
+            .collect();
+        let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
+        let direction = DVec3::new(0.35, 0.6, 1.0).normalize_or(DVec3::Y);
+        let fits = |distance: f64| {
+            let view = View {
+                eye: centre + direction * distance,
+                world_from_eye: View::looking_along(-direction),
+                lens: Lens::Perspective { fov_x: fov.to_radians() },
+                size,
+                near: distance * 1e-3,
+                tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            };
+            corners.iter().all(|&c| view.project(c).is_some_and(|p| view.in_picture(&p)))
+        };
+        let nearer = (0..200).map(|k| radius * 0.5 * 1.05f64.powi(k));
+        let distance = nearer.into_iter().find(|&d| fits(d)).unwrap_or(radius * 2.0);
+        Self { centre, radius, eye: centre + direction * distance * 1.03 }
     }
 }
 
