@@ -21,8 +21,9 @@ fn compare(gpu: &Arc<Gpu>, name: &str, colour: Colour, file: &str) {
     let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
     let mut view = aslant(&field, [96, 64], 1.0);
     // Near the ground at one end, so that every level occurs.
-    view.eye = field.world_at(20.0, 270.0, 1200.0);
-    view.world_from_eye = View::looking_along(field.world_at(200.0, 120.0, 500.0) - view.eye);
+    let statistics = field.statistics();
+    view.eye = field.world_at(20.0, 270.0, f64::from(statistics.max) + 200.0);
+    view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
     let look = Look { colour, ..Look::default() };
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
     let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
