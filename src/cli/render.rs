@@ -41,6 +41,9 @@ pub struct RenderArgs {
     /// The look.
     #[command(flatten)]
     pub look: LookArgs,
+    /// Draw it so often and report the median times.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub repeat: u32,
     /// Measure the error of what was drawn, prove it watertight, count hole pixels.
     #[arg(long)]
     pub measure: bool,
@@ -122,7 +125,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
-    let shot = scene.shoot(technique.as_mut(), &view)?;
+    let shot = scene.shoot_often(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;
     let measured = if args.measure { Some(scene.measure(technique.as_ref(), &view, &shot)?) } else { None };
     let messages = gpu.messages();
@@ -154,6 +157,11 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     };
     report::print(common, &rendered)?;
     Ok(if missed || !messages.is_empty() { Outcome::LimitMissed } else { Outcome::Done })
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
 fn ms(since: Instant) -> f64 {
@@ -223,10 +231,11 @@ pub struct Shot {
 impl Scene<'_> {
     /// Draws one view offscreen.
     pub fn shoot(&self, technique: &mut dyn Technique, view: &View) -> Result<Shot> {
-        let selected = Instant::now();
-        let mut list = DrawList::default();
-        technique.select(view, &mut list);
-        let select_ms = ms(selected);
+        self.shoot_often(technique, view, 1)
+    }
+
+    /// Draws one view offscreen `times` times; the times are medians.
+    fn shoot_often(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
         let offscreen = Offscreen::new(self.gpu, view.size)?;
         let (resident, limits) = (technique.resident(), technique.limits());
         let mut terrain =
@@ -234,22 +243,32 @@ impl Scene<'_> {
         let statistics = self.field.statistics();
         let frame = self.look.frame(self.field, view, [statistics.min, statistics.max]);
         let mut frames = Frames::new(self.gpu, self.plan.measured)?;
-        let recorded = Instant::now();
-        let mut recording = frames.begin()?;
-        terrain.prepare(&mut recording, &frame, &list)?;
-        target::begin(&recording, offscreen.attachment(), &offscreen.depth);
-        terrain.draw(&mut recording, &list)?;
-        target::end(&recording);
-        offscreen.read_back(&recording);
-        let record_ms = ms(recorded);
-        frames.submit(None, None)?;
-        frames.finish().context("drawing")?;
+        let mut list = DrawList::default();
+        let (mut selects, mut records, mut timings) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..times {
+            let start = Instant::now();
+            list.clear();
+            technique.select(view, &mut list);
+            selects.push(ms(start));
+            let start = Instant::now();
+            let mut recording = frames.begin()?;
+            terrain.prepare(&mut recording, &frame, &list)?;
+            target::begin(&recording, offscreen.attachment(), &offscreen.depth);
+            terrain.draw(&mut recording, &list)?;
+            target::end(&recording);
+            offscreen.read_back(&recording);
+            records.push(ms(start));
+            frames.submit(None, None)?;
+            frames.finish().context("drawing")?;
+            timings.push(frames.timing.clone());
+        }
+        timings.sort_by(|a, b| a.total_ms.total_cmp(&b.total_ms));
         Ok(Shot {
             picture: offscreen.picture(),
             list,
-            timing: frames.timing.clone(),
-            select_ms,
-            record_ms,
+            timing: timings[timings.len() / 2].clone(),
+            select_ms: median(selects),
+            record_ms: median(records),
             device_bytes: self.gpu.device_bytes().values().sum(),
         })
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 
 use super::{Common, report};
 use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
@@ -335,9 +335,7 @@ impl ViewArgs {
         };
         let world_from_eye = match (&self.look, self.yaw, self.pitch) {
             (Some(text), _, _) => View::looking_along(position("--look", text, field)? - eye) * View::rolled(self.roll),
-            (None, None, None) if self.eye.is_none() => {
-                View::looking_along(whole.centre - eye) * View::rolled(self.roll)
-            }
+            (None, None, None) if self.eye.is_none() => whole.world_from_eye * View::rolled(self.roll),
             (None, yaw, pitch) => View::turned(yaw.unwrap_or(-90.0), pitch.unwrap_or(0.0), self.roll),
         };
         let above = eye.y - field.height_at(eye.x, eye.z).unwrap_or(whole.centre.y);
@@ -364,6 +362,8 @@ pub struct Whole {
     pub radius: f64,
     /// From where all of it is seen, from the south and above.
     pub eye: DVec3,
+    /// The eye's rotation there.
+    pub world_from_eye: DMat3,
 }
 
 impl Whole {
@@ -378,20 +378,32 @@ impl Whole {
             .collect();
         let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
         let direction = DVec3::new(0.35, 0.6, 1.0).normalize_or(DVec3::Y);
-        let fits = |distance: f64| {
-            let view = View {
-                eye: centre + direction * distance,
-                world_from_eye: View::looking_along(-direction),
-                lens: Lens::Perspective { fov_x: fov.to_radians() },
-                size,
-                near: distance * 1e-3,
-                tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
-            };
-            corners.iter().all(|&c| view.project(c).is_some_and(|p| view.in_picture(&p)))
+        let mut view = View {
+            eye: centre + direction * radius,
+            world_from_eye: View::looking_along(-direction),
+            lens: Lens::Perspective { fov_x: fov.to_radians() },
+            size,
+            near: radius * 1e-3,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
         };
-        let nearer = (0..200).map(|k| radius * 0.5 * 1.05f64.powi(k));
-        let distance = nearer.into_iter().find(|&d| fits(d)).unwrap_or(radius * 2.0);
-        Self { centre, radius, eye: centre + direction * distance * 1.03 }
+        // Step back until all of it is in the picture, moving aside so that it stays in the middle.
+        for _ in 0..200 {
+            let seen: Option<Vec<_>> = corners.iter().map(|&c| view.project(c).map(|p| p.pixel)).collect();
+            let Some(seen) = seen else {
+                view.eye += direction * radius * 0.2;
+                continue;
+            };
+            let low = seen.iter().copied().fold(seen[0], DVec2::min);
+            let high = seen.iter().copied().fold(seen[0], DVec2::max);
+            let picture = DVec2::new(f64::from(size[0]), f64::from(size[1]));
+            let aside = ((low + high) - picture) / 2.0 * view.eye.distance(centre) / view.focal_px();
+            view.eye += view.world_from_eye * DVec3::new(aside.x, -aside.y, 0.0);
+            if (high - low).cmple(picture * 0.94).all() {
+                break;
+            }
+            view.eye += direction * radius * 0.05;
+        }
+        Self { centre, radius, eye: view.eye, world_from_eye: view.world_from_eye }
     }
 }
 
