@@ -378,30 +378,34 @@ impl Whole {
             .collect();
         let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
         let direction = DVec3::new(0.35, 0.6, 1.0).normalize_or(DVec3::Y);
-        let mut view = View {
-            eye: centre + direction * radius,
+        let picture = DVec2::new(f64::from(size[0]), f64::from(size[1]));
+        let at = |distance: f64, aside: DVec3| View {
+            eye: centre + direction * distance + aside,
             world_from_eye: View::looking_along(-direction),
             lens: Lens::Perspective { fov_x: fov.to_radians() },
             size,
             near: radius * 1e-3,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
         };
-        // Step back until all of it is in the picture, moving aside so that it stays in the middle.
-        for _ in 0..200 {
+        // The rectangle around the corners on the screen, if all are in front of the eye.
+        let outline = |view: &View| {
             let seen: Option<Vec<_>> = corners.iter().map(|&c| view.project(c).map(|p| p.pixel)).collect();
-            let Some(seen) = seen else {
-                view.eye += direction * radius * 0.2;
-                continue;
-            };
-            let low = seen.iter().copied().fold(seen[0], DVec2::min);
-            let high = seen.iter().copied().fold(seen[0], DVec2::max);
-            let picture = DVec2::new(f64::from(size[0]), f64::from(size[1]));
-            let aside = ((low + high) - picture) / 2.0 * view.eye.distance(centre) / view.focal_px();
-            view.eye += view.world_from_eye * DVec3::new(aside.x, -aside.y, 0.0);
-            if (high - low).cmple(picture * 0.94).all() {
+            seen.map(|s| (s.iter().copied().fold(s[0], DVec2::min), s.iter().copied().fold(s[0], DVec2::max)))
+        };
+        // From afar, come closer while all of it fits, moving aside so that it stays in the middle.
+        let half_angle = (fov.to_radians() / 2.0).min(picture.y / (2.0 * at(1.0, DVec3::ZERO).focal_px()));
+        let mut view = at(4.0 * radius / half_angle.tan(), DVec3::ZERO);
+        let mut aside = DVec3::ZERO;
+        for step in 0..200 {
+            let distance = 4.0 * radius / half_angle.tan() * 0.97f64.powi(step);
+            let next = at(distance, aside);
+            let Some((low, high)) = outline(&next) else { break };
+            if !(high - low).cmple(picture * 0.94).all() {
                 break;
             }
-            view.eye += direction * radius * 0.05;
+            view = next;
+            let off = (low + high - picture) / 2.0 * distance / view.focal_px();
+            aside += view.world_from_eye * DVec3::new(off.x, -off.y, 0.0);
         }
         Self { centre, radius, eye: view.eye, world_from_eye: view.world_from_eye }
     }
