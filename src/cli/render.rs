@@ -77,6 +77,8 @@ struct Measured {
     error_px: Statistics,
     error_m: Statistics,
     hole_pixels: usize,
+    /// The first few, from the top left corner.
+    hole_pixels_at: Vec<[usize; 2]>,
     skirt_pixels: usize,
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -279,20 +281,46 @@ impl Scene<'_> {
             expand::triangles(self.field, &Frame::placing(self.field, view), technique.resident(), &shot.list);
         let proof = watertight::prove(self.field, &view.frustum(), &triangles);
         drop(triangles);
-        let brute = lod::find("brute-force").expect("in the table");
-        let mut brute = (brute.build)(Arc::clone(self.field), &Settings::defaults(brute));
-        let truth = self.shoot(brute.as_mut(), view)?;
-        let covered = |shot: &Shot| -> Vec<bool> { shot.picture.pixels().map(|p| p.0[3] > 0).collect() };
-        let radius = picture::outline_radius(view.tolerance.px);
-        let holes = picture::hole_pixels(&covered(shot), &covered(&truth), view.size[0] as usize, radius);
+        let holes = self.hole_pixels(view, shot)?;
+        let width = view.size[0] as usize;
         Ok(Measured {
             error_px: errors.screen_px.into(),
             error_m: errors.vertical_m.into(),
             hole_pixels: holes.len(),
+            hole_pixels_at: holes.iter().take(8).map(|k| [k % width, k / width]).collect(),
             // No technique of the table draws skirts.
             skirt_pixels: 0,
             watertight: proof.is_ok(),
             counter_example: proof.err().map(|e| e.to_string()),
         })
     }
+
+    /// Pixels where the sky shines through land. Where samples have no data, land within the tolerance of the
+    /// truth may show what the truth just hides: pixels that missing land projects to do not count.
+    fn hole_pixels(&self, view: &View, shot: &Shot) -> Result<Vec<usize>> {
+        let covered = |shot: &Shot| -> Vec<bool> { shot.picture.pixels().map(|p| p.0[3] > 0).collect() };
+        let (width, radius) = (view.size[0] as usize, picture::outline_radius(view.tolerance.px));
+        let truth = covered(&self.shoot(brute_force(self.field).as_mut(), view)?);
+        let mut holes = picture::hole_pixels(&covered(shot), &truth, width, radius);
+        if self.field.holes().count() > 0 {
+            let missing = Arc::new(self.field.around_holes());
+            let scene = Scene { field: &missing, ..*self };
+            let mut mask = covered(&scene.shoot(brute_force(&missing).as_mut(), view)?);
+            // Holes smaller than a pixel may fall between pixel centres.
+            let [w, h] = missing.stored();
+            for (i, j) in (0..h).flat_map(|j| (0..w).map(move |i| (i, j))).filter(|&(i, j)| !missing.is_hole(i, j)) {
+                let seen = view.project(missing.world(i, j)).filter(|p| view.in_picture(p));
+                let pixel = seen.map(|p| (p.pixel.y as usize * width + p.pixel.x as usize).min(mask.len() - 1));
+                pixel.into_iter().for_each(|k| mask[k] = true);
+            }
+            let missing = picture::widened(&mask, width, radius);
+            holes.retain(|&k| !missing[k]);
+        }
+        Ok(holes)
+    }
+}
+
+fn brute_force(field: &Arc<Field>) -> Box<dyn Technique> {
+    let entry = lod::find("brute-force").expect("in the table");
+    (entry.build)(Arc::clone(field), &Settings::defaults(entry))
 }
