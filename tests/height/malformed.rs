@@ -97,6 +97,9 @@ fn huge_claims_are_refused() {
     let dem = String::from_utf8(tiny::usgs_dem(|_| [0, 3])).unwrap();
     let far = dem.replacen("6.000000000000000D+05", "6.000000000000000D+11", 1).into_bytes();
     let many = dem.replacen("     1     5   ", "     199999   ", 1).into_bytes();
+    // Steps so many that neighbouring rows are the same number.
+    let fine = dem.replacen("  3.000000E1  3.000000E1", "  3.000000E1 1.000000E-9", 1);
+    let fine = fine.replace("5.100000000000000D+06", "5.100000000000000D+11").into_bytes();
     for (name, bytes) in [
         ("a.tif", tiff(1 << 16, 1 << 15)),
         ("b.tif", tiff(u64::from(u32::MAX), u64::from(u32::MAX))),
@@ -106,6 +109,7 @@ fn huge_claims_are_refused() {
         ("f.asc", asc(1 << 15, 1 << 15)),
         ("g.dem", far),
         ("h.dem", many),
+        ("i.dem", fine),
     ] {
         let start = std::time::Instant::now();
         let error = load_bytes(name, &bytes, &Options::default()).unwrap_err();
