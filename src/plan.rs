@@ -77,7 +77,8 @@ pub struct ScenePlan {
     pub filtered: bool,
     /// Timestamps and pipeline statistics are taken.
     pub measured: bool,
-    stored: [u32; 2],
+    /// Samples stored along (x, z).
+    pub stored: [u32; 2],
 }
 
 /// One feature of a plan and what became of it.
@@ -119,11 +120,6 @@ impl ScenePlan {
             ));
         }
         Ok(plan)
-    }
-
-    /// Samples stored along (x, z).
-    pub fn stored(&self) -> [u32; 2] {
-        self.stored
     }
 
     /// Texels of a page of the height texture (x, z).

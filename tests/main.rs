@@ -1,4 +1,9 @@
 //! All integration tests in one binary; the modules mirror `src/`.
 
+mod architecture;
+mod conformance;
+#[cfg(feature = "vulkan")]
+mod gpu;
 mod height;
+mod measure;
 mod synth;

@@ -70,7 +70,7 @@ fn paged(
     let layers = columns * rows;
     let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
     let image = Image::new(gpu, ImageInfo { purpose, size, layers: Some(layers), format, usage })?;
-    let stored = plan.stored();
+    let stored = plan.stored;
     upload(gpu, &image, layers, size, u64::from(size[0]) * texel, |layer, y, count, staging| {
         let corner = [layer % columns * size[0], layer / columns * size[1]];
         for z in corner[1] + y..corner[1] + y + count {
@@ -148,15 +148,19 @@ pub enum Sampling {
 
 /// A sampler; the owner destroys it.
 pub fn sampler(gpu: &Gpu, sampling: Sampling) -> Result<vk::Sampler> {
-    let (filter, mode, name) = match sampling {
-        Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
-        Sampling::Clamped => (vk::Filter::LINEAR, vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
-        Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerAddressMode::REPEAT, "repeating sampler"),
+    let (filter, mipmap) = match sampling {
+        Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),
+        Sampling::Clamped | Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
+    };
+    let (mode, name) = match sampling {
+        Sampling::Texels => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
+        Sampling::Clamped => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
+        Sampling::Repeated => (vk::SamplerAddressMode::REPEAT, "repeating sampler"),
     };
     let info = vk::SamplerCreateInfo::default()
         .mag_filter(filter)
         .min_filter(filter)
-        .mipmap_mode(vk::SamplerMipmapMode::LINEAR)
+        .mipmap_mode(mipmap)
         .address_mode_u(mode)
         .address_mode_v(mode)
         .address_mode_w(mode)

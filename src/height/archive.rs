@@ -51,7 +51,7 @@ pub(super) fn read_zip(source: &mut Source, options: &Options) -> Result<Raster,
     for (_, index, member) in members.iter().filter(|(.., member)| is_text(member)) {
         texts.push((member.clone(), unpack(*index, SIBLING_BYTES)?));
     }
-    for (size, index, member) in &members {
+    for (size, index, member) in members.iter().filter(|(.., member)| !is_text(member)) {
         let sibling = |extension: &str| {
             let stem = member.rsplit_once('.').map_or(member.as_str(), |(stem, _)| stem);
             let fits = |other: &str| [stem, member].iter().any(|stem| is_stem(other, stem, extension));
@@ -94,10 +94,7 @@ fn read_member(
     if len > limit {
         return Err(Error::new(name, "unpacked length", format!("expected at most {limit} bytes, found more")));
     }
-    let kind = match options.raw {
-        Some(_) => Kind::Raw,
-        None => Kind::of(&bytes[..bytes.len().min(HEAD_BYTES as usize)], len, siblings("hdr").is_some()),
-    };
+    let kind = Kind::of(&bytes[..bytes.len().min(HEAD_BYTES as usize)], len, siblings("hdr").is_some());
     if matches!(kind, Kind::Zip | Kind::Gzip) {
         return Err(Error::new(name, "content", "expected a height file, found an archive within an archive"));
     }

@@ -2,7 +2,7 @@
 
 use super::{
     Error, Samples,
-    georef::{self, Place},
+    georef::{self, Grid, Place},
     load::{Options, Source},
     raster::Raster,
     text::Words,
@@ -41,8 +41,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let size = size.map(|n| n as u32);
     let mut raster = Raster::new("ESRI ASCII grid", "text", size, Samples::F32(heights));
     raster.nodata = header.value(&["nodata_value", "nodata"]);
-    let (origin, step) = header.place(source, size)?;
-    (raster.place, raster.warnings) = place(source, origin, step, size);
+    (raster.place, raster.warnings) = place(source, header.grid(source, size)?, size);
     Ok(raster)
 }
 
@@ -77,8 +76,8 @@ impl Header {
         Ok([side("ncols")?, side("nrows")?])
     }
 
-    /// Coordinates of the north-west sample, and steps.
-    fn place(&self, source: &Source, [_, rows]: [u32; 2]) -> Result<([f64; 2], [f64; 2]), Error> {
+    /// Where the samples lie.
+    fn grid(&self, source: &Source, [_, rows]: [u32; 2]) -> Result<Grid, Error> {
         let step = [self.value(&["dx", "cellsize"]), self.value(&["dy", "cellsize"])];
         let [Some(dx), Some(dy)] = step else {
             return Err(source.error("cellsize", "expected cellsize or dx and dy, found none"));
@@ -96,11 +95,11 @@ impl Header {
 }
 
 /// The place by the projection beside the file, else by the look of the coordinates.
-pub(super) fn place(source: &Source, origin: [f64; 2], step: [f64; 2], size: [u32; 2]) -> (Option<Place>, Vec<String>) {
+pub(super) fn place(source: &Source, grid: Grid, size: [u32; 2]) -> (Option<Place>, Vec<String>) {
     match source.sibling_text("prj").and_then(|text| georef::from_wkt(&text)) {
-        Some((unit, crs)) => (Some(Place { origin, step, unit, crs }), Vec::new()),
+        Some((unit, crs)) => (Some(Place { origin: grid.0, step: grid.1, unit, crs }), Vec::new()),
         None => {
-            let (place, warning) = Place::guessed(origin, step, size);
+            let (place, warning) = Place::guessed(grid, size);
             (Some(place), vec![warning])
         }
     }

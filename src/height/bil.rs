@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     Error, asc, envi,
-    georef::{Place, Unit},
+    georef::{Grid, Place, Unit},
     load::{Options, Source},
     raster::Raster,
     raw::Rows,
@@ -45,8 +45,8 @@ pub(super) struct Header {
     /// Bytes from one row to the next, if not those of its samples.
     pub stride: Option<u64>,
     pub nodata: Option<f64>,
-    /// Coordinates of the north-west sample, and steps.
-    pub place: Option<([f64; 2], [f64; 2])>,
+    /// Where the samples lie.
+    pub grid: Option<Grid>,
     /// Unit and name of the coordinate system.
     pub system: Option<(Unit, Option<String>)>,
 }
@@ -69,10 +69,10 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let rows = Rows { sample: header.sample, order: header.order, start: header.start, stride };
     let mut raster = Raster::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
     raster.nodata = header.nodata;
-    if let Some((origin, step)) = header.place {
+    if let Some((origin, step)) = header.grid {
         (raster.place, raster.warnings) = match header.system {
             Some((unit, crs)) => (Some(Place { origin, step, unit, crs }), Vec::new()),
-            None => asc::place(source, origin, step, size),
+            None => asc::place(source, (origin, step), size),
         };
     }
     Ok(raster)
@@ -133,7 +133,7 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
         start: values.number("skipbytes")?.unwrap_or(0),
         stride: values.number("totalrowbytes")?,
         nodata,
-        place: place(&values, size)?,
+        grid: grid(&values, size)?,
         system: None,
     })
 }
@@ -155,8 +155,8 @@ fn sample(values: &Values, nodata: Option<f64>) -> Result<SampleType, Error> {
     }
 }
 
-/// Coordinates of the north-west sample and steps: ULXMAP is the centre of a sample, XLLCORNER a corner.
-fn place(values: &Values, [_, rows]: [u64; 2]) -> Result<Option<([f64; 2], [f64; 2])>, Error> {
+/// Where the samples lie: ULXMAP is the centre of a sample, XLLCORNER a corner.
+fn grid(values: &Values, [_, rows]: [u64; 2]) -> Result<Option<Grid>, Error> {
     let number =
         |keys: [&str; 2]| -> Result<Option<f64>, Error> { Ok(values.number(keys[0])?.or(values.number(keys[1])?)) };
     let (Some(dx), Some(dy)) = (number(["xdim", "cellsize"])?, number(["ydim", "cellsize"])?) else { return Ok(None) };

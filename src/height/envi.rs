@@ -46,7 +46,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Header, Error> {
         start: values.number("header offset")?.unwrap_or(0),
         stride: None,
         nodata: values.number("data ignore value")?,
-        place: map.as_ref().map(|map| (map.origin, map.step)),
+        grid: map.as_ref().map(|map| (map.origin, map.step)),
         system: system.or(map.map(|map| (map.unit, map.crs))),
     })
 }

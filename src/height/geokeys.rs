@@ -42,7 +42,7 @@ pub(super) fn read<R: Read + Seek>(decoder: &mut Decoder<R>, size: [u32; 2]) -> 
         match keys.unit() {
             Some(unit) => Place { origin, step, unit, crs: keys.crs() },
             None => {
-                let (place, warning) = Place::guessed(origin, step, size);
+                let (place, warning) = Place::guessed((origin, step), size);
                 warnings.push(warning);
                 place
             }

@@ -41,6 +41,9 @@ pub enum Unit {
     Mercator,
 }
 
+/// Coordinates of the north-west sample (east, north), and steps (east, south).
+pub type Grid = ([f64; 2], [f64; 2]);
+
 /// Where a raster lies, north up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
@@ -81,7 +84,7 @@ impl Place {
 
     /// A place whose file names no coordinate system: degrees if all of it could be longitude and latitude,
     /// and a warning that says what was taken.
-    pub fn guessed(origin: [f64; 2], step: [f64; 2], [w, h]: [u32; 2]) -> (Self, String) {
+    pub fn guessed((origin, step): Grid, [w, h]: [u32; 2]) -> (Self, String) {
         let [east, south] = [origin[0] + step[0] * f64::from(w), origin[1] - step[1] * f64::from(h)];
         // A grid of someone's own often begins near (0, 0) with steps of metres; a degree is the longest
         // step of published global grids.

@@ -5,7 +5,7 @@
 use super::{
     Error,
     georef::{Place, Unit},
-    load::Source,
+    load::{Options, Source},
     raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
@@ -20,10 +20,11 @@ pub(super) fn side(len: u64) -> Option<u32> {
 }
 
 /// Reads a tile.
-pub(super) fn read(source: &mut Source) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
     let side = side(source.len).ok_or_else(|| source.error("length", "expected 1201² or 3601² samples"))?;
+    let count = source.samples([u64::from(side); 2], options)?;
     let rows = Rows { sample: SampleType::I16, order: Order::Big, start: 0, stride: u64::from(side) * 2 };
-    let samples = rows.read(source, [side; 2], (side * side) as usize)?;
+    let samples = rows.read(source, [side; 2], count)?;
     let mut raster = Raster::new("SRTM HGT", "i16", [side; 2], samples);
     raster.nodata = Some(VOID);
     let corner = source.name.rsplit(['/', '\\']).find_map(south_west);

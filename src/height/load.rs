@@ -91,6 +91,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
                 .ok_or_else(|| source.error("data", "expected a data file beside the header, found none"))?;
             let (file, len) = open(&data)?;
             let name = data.display().to_string();
+            let siblings = |extension: &str| sibling(&data, extension);
             let mut source = Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings };
             read(&mut source, Kind::Bil, options)?.finish(&name, options)
         }
@@ -100,8 +101,19 @@ pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
 
 /// Reads a file held in memory; `name` is for messages, and for the position of SRTM tiles.
 pub fn load_bytes(name: &str, bytes: &[u8], options: &Options) -> Result<Loaded, Error> {
+    load_bytes_with(name, bytes, &|_| None, options)
+}
+
+/// Reads a file held in memory, of which `siblings` yields the file beside it with a given extension: `hdr`
+/// (header) and `prj` (projection).
+pub fn load_bytes_with(
+    name: &str,
+    bytes: &[u8],
+    siblings: &dyn Fn(&str) -> Option<Vec<u8>>,
+    options: &Options,
+) -> Result<Loaded, Error> {
     let len = bytes.len() as u64;
-    let mut source = Source { name, reader: &mut Cursor::new(bytes), len, siblings: &|_| None };
+    let mut source = Source { name, reader: &mut Cursor::new(bytes), len, siblings };
     let kind = source.kind(options)?;
     read(&mut source, kind, options)?.finish(name, options)
 }
@@ -252,7 +264,7 @@ pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result
         Kind::UsgsDem => usgs_dem::read(source, options),
         Kind::Header => Err(source.error("data", "expected a data file beside the header, found none")),
         Kind::Bil => bil::read(source, options),
-        Kind::Hgt => hgt::read(source),
+        Kind::Hgt => hgt::read(source, options),
         Kind::Raw => raw::read(source, options),
         Kind::Picture(format) => Err(source.error("content", format!("expected heights, found a {format} picture"))),
         Kind::Unknown => Err(source.error("content", raw::hint(source.len))),

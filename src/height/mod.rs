@@ -25,7 +25,7 @@ mod tiles;
 mod usgs_dem;
 
 pub use georef::metres_per_degree;
-pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes};
+pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
 pub use sample::{Order, SampleType};
 
 use glam::DVec3;

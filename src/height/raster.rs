@@ -188,7 +188,7 @@ impl Raster {
         };
         let spacing = options.spacing.unwrap_or(spacing);
         // Positions are f64 metres and become f32 about the eye: both ends far beyond any planet.
-        if spacing.iter().any(|s| !(1e-6..=1e9).contains(s)) || origin.iter().any(|o| !(o.abs() <= 1e12)) {
+        if spacing.iter().any(|s| !(1e-6..=1e9).contains(s)) || origin.iter().any(|o| !(-1e12..=1e12).contains(o)) {
             let what = format!("expected a spacing of 1e-6 to 1e9 m, found {spacing:?} m at {origin:?} m");
             return Err(Error::new(name, "spacing", what));
         }
@@ -266,7 +266,7 @@ fn compact_scale(heights: &[f32]) -> Option<(f64, f64)> {
     for height in heights.iter().map(|&h| f64::from(h)) {
         while (height * finest).fract() != 0.0 {
             finest *= 2.0;
-            if !(finest <= 256.0) || !height.is_finite() {
+            if finest > 256.0 || !height.is_finite() {
                 return None;
             }
         }

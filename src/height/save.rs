@@ -113,7 +113,7 @@ fn write_png(field: &Field, out: &mut Out) -> io::Result<()> {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
     encoder.set_compression(png::Compression::High);
-    encoder.add_text_chunk("Description".into(), format!("height in metres = (code - {zero}) * {scale}"))?;
+    encoder.add_text_chunk("Description".into(), format!("height in metres = (code - {zero}) * {}", scale as f32))?;
     let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_be_bytes()).collect();
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&bytes)?;
@@ -156,7 +156,8 @@ fn write_tiff(field: &Field, out: &mut Out) -> io::Result<()> {
 fn write_image<K: TiffKind>(field: &Field, tiff: TiffEncoder<&mut Out, K>) -> tiff::TiffResult<()> {
     let mark = hole_mark(field);
     let short = |h: f32| h.fract() == 0.0 && (-32768.0..=32767.0).contains(&h);
-    if short(mark) && heights(field).all(short) {
+    let holes_fit = field.holes().count() == 0 || short(mark);
+    if holes_fit && heights(field).all(short) {
         let tiff = tiff.with_predictor(Predictor::Horizontal);
         write_rows::<GrayI16, K>(field, mark, tiff, |h| h as i16)
     } else {
@@ -185,11 +186,7 @@ where
     if field.holes().count() > 0 {
         directory.write_tag(Tag::GdalNodata, mark.to_string().as_str())?;
     }
-    let rows = 64;
-    image.rows_per_strip(rows)?;
-    for start in (0..h).step_by(rows as usize) {
-        let strip = (start..h.min(start + rows)).flat_map(|j| row(field, j, mark)).map(&value);
-        image.write_strip(&strip.collect::<Vec<_>>())?;
-    }
-    image.finish()
+    // Whole: tiff 0.11.3 leaves strips written one by one uncompressed, and names them compressed.
+    let values: Vec<_> = (0..h).flat_map(|j| row(field, j, mark)).map(value).collect();
+    image.write_data(&values)
 }

@@ -133,7 +133,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
         high[1] = high[1].max((north / header.step[1]).ceil());
     }
     // Whole numbers beyond this are not exact; no grid on Earth comes near.
-    if low.iter().chain(&high).any(|at| !(at.abs() < 1e12)) {
+    if low.iter().chain(&high).any(|at| !(-1e12..=1e12).contains(at)) {
         return Err(
             source.error("profiles", format!("expected coordinates of a grid, found {low:?} to {high:?} steps"))
         );

@@ -1,11 +1,13 @@
 //! Every sample of the field, in every view: the truth that the others are compared with.
 //!
-//! One static grid mesh, instanced over the field and displaced in the vertex program. Nothing is culled.
+//! One static grid mesh, instanced over the field and displaced in the vertex program. Nothing is culled;
+//! only blocks of nothing but holes are left out.
 
 use std::sync::Arc;
 
 use super::{Entry, Settings, Technique};
 use crate::draw::{Draw, DrawList, Geometry, Instance, LatticeVertex, Limits, Source, Topology};
+use crate::height::surface::has_land;
 use crate::height::{Field, rtin};
 use crate::view::View;
 
@@ -33,6 +35,7 @@ impl BruteForce {
         let blocks = [w, h].map(|n| (n - 1).div_ceil(CELLS as u32) as i32);
         let instances = (0..blocks[1])
             .flat_map(|j| (0..blocks[0]).map(move |i| [i * CELLS, j * CELLS]))
+            .filter(|&[x, z]| has_land(&field, [x, z], [(x + CELLS).min(w as i32 - 1), (z + CELLS).min(h as i32 - 1)]))
             .map(|origin| Instance { origin, cells: CELLS as u32, ..Instance::default() })
             .collect();
         Self { mesh: grid(), instances }

@@ -68,7 +68,7 @@ pub struct Errors {
 }
 
 /// Measures the triangles of a list. Time is linear in triangles and samples; memory is bounded by a
-/// thousandth of the field's samples for each of [`BATCH`] pieces of work.
+/// thousandth of the field's samples for each of 64 pieces of work.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
     let ruler = Ruler::new(field, view);
     let (mut vertical, mut screen) = (ruler.tally(), ruler.tally());

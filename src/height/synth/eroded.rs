@@ -18,7 +18,7 @@ const CODE: f32 = 0.1;
 /// Cells of the longer side at most on the coarsest grid.
 const COARSEST: usize = 160;
 /// Steps on the coarsest grid, and on each finer one.
-const STEPS: [usize; 2] = [80, 10];
+const STEPS: [usize; 2] = [80, 8];
 /// K · dt of a step on the coarsest grid, and on each finer one; with U / K in metres, time needs no unit of its own.
 const PACE: [f64; 2] = [0.4, 0.1];
 /// Height of the lowest land, metres.
@@ -71,27 +71,32 @@ impl Rock {
         (14.0 + 480.0 * crest * crest * crest) * hardness
     }
 
+    /// How firm the rock is, about −1 to 1.
+    fn firmness(&self, grid: Grid, k: usize) -> f64 {
+        noise::fractal(self.place(grid, k, 1_500.0), 3, self.seed ^ 0x40)
+    }
+
     /// Steepest slope that stands: from rubble at 29° to walls at 60°, in tilted beds.
-    fn repose(&self, grid: Grid, k: usize, height: f64) -> f64 {
+    fn repose(&self, grid: Grid, k: usize, height: f64, firmness: f64) -> f64 {
         let [x, z] = self.place(grid, k, 1_500.0);
         let bed = noise::gradient(height / 170.0 + x * 0.8, z * 0.5, self.seed ^ 0x30);
-        let firm = noise::fractal([x, z], 3, self.seed ^ 0x40);
-        (1.05 + 0.25 * bed + 0.4 * firm).clamp(0.55, 1.7)
+        (1.05 + 0.25 * bed + 0.4 * firmness).clamp(0.55, 1.7)
     }
 
     /// The land cut by rivers, coarse grids first.
     fn grow(&self, grid: Grid) -> Vec<f64> {
         let finer = usize::from(grid.size[0].max(grid.size[1]) > COARSEST);
         let mut height = match finer {
-            0 => (0..grid.len()).map(|k| 900.0 * (1.0 + self.massif(grid, k, 6))).collect(),
+            0 => grid.map(|k| 900.0 * (1.0 + self.massif(grid, k, 6))),
             _ => {
                 let coarse = Grid { size: grid.size.map(|n| n.div_ceil(2).max(2)), spacing: grid.spacing * 2.0 };
                 self.refine(grid, coarse, &self.grow(coarse))
             }
         };
-        let uplift: Vec<f64> = (0..grid.len()).map(|k| self.uplift(grid, k)).collect();
+        let uplift = grid.map(|k| self.uplift(grid, k));
+        let firmness = grid.map(|k| self.firmness(grid, k));
         for _ in 0..STEPS[finer] {
-            self.cut(grid, &mut height, &uplift, PACE[finer]);
+            self.cut(grid, &mut height, &uplift, &firmness, PACE[finer]);
         }
         height
     }
@@ -100,7 +105,7 @@ impl Rock {
     /// lines of the coarse grid, with a little noise for new gullies to start from.
     fn refine(&self, grid: Grid, coarse: Grid, height: &[f64]) -> Vec<f64> {
         let [w, h] = coarse.size;
-        let salt = self.seed ^ (grid.len() as u64) << 8;
+        let salt = self.seed ^ (grid.cells() as u64) << 8;
         let fine = |k: usize| {
             let [i, j] = [k % grid.size[0], k / grid.size[0]];
             let [x, z] = noise::warped([i as f64 / 9.0, j as f64 / 9.0], 0.28, salt).map(|t| t * 4.5);
@@ -111,12 +116,12 @@ impl Rock {
             let smooth = row(j0) * (1.0 - v) + row(j0 + 1) * v;
             smooth + noise::white(i as i64, j as i64, salt) * 0.1 * grid.spacing
         };
-        (0..grid.len()).map(fine).collect()
+        grid.map(fine)
     }
 
     /// One implicit step of uplift and stream power, every cell after those it drains to; then slopes beyond repose
     /// slide. Both take the receivers' mean, so that slopes do not break into eight directions.
-    fn cut(&self, grid: Grid, height: &mut [f64], uplift: &[f64], pace: f64) {
+    fn cut(&self, grid: Grid, height: &mut [f64], uplift: &[f64], firmness: &[f64], pace: f64) {
         let flow = Flow::new(grid, height, 0.0);
         let area = flow.area(grid);
         for &k in &flow.order {
@@ -126,7 +131,7 @@ impl Rock {
             }
             let grain = 1.0 + 0.5 * noise::white(k as i64, 0, self.seed ^ 0x45);
             let power = pace * area[k].sqrt() * grain;
-            let repose = self.repose(grid, k, height[k]);
+            let repose = self.repose(grid, k, height[k], firmness[k]);
             let (mut sum, mut weight, mut ceiling) = (height[k] + pace * uplift[k], 1.0, 0.0);
             for &(n, share, distance) in flow.receivers(grid, k).iter() {
                 sum += power * share / distance * height[n];

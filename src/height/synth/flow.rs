@@ -7,6 +7,8 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 /// A rectangle of square cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
@@ -17,7 +19,7 @@ pub struct Grid {
 }
 
 /// Offsets of the eight neighbours and their distance in cells.
-const NEIGHBOURS: [(isize, isize, f64); 8] = {
+const NEIGHBOURS: [(i32, i32, f64); 8] = {
     const DIAGONAL: f64 = std::f64::consts::SQRT_2;
     [
         (-1, -1, DIAGONAL),
@@ -33,7 +35,7 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = {
 
 impl Grid {
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub fn cells(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
@@ -41,6 +43,11 @@ impl Grid {
     pub fn is_border(&self, k: usize) -> bool {
         let (i, j) = (k % self.size[0], k / self.size[0]);
         i == 0 || j == 0 || i + 1 == self.size[0] || j + 1 == self.size[1]
+    }
+
+    /// A value of each cell; on all cores, as none depends on another.
+    pub fn map(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> Vec<f64> {
+        (0..self.cells()).into_par_iter().map(value).collect()
     }
 
     /// Distance of two cells, metres.
@@ -51,12 +58,14 @@ impl Grid {
     }
 
     /// The neighbours of cell `k` and their distance, metres.
+    #[inline]
     pub fn neighbours(self, k: usize) -> impl Iterator<Item = (usize, f64)> {
-        let [w, h] = self.size.map(|n| n as isize);
-        let (i, j) = (k as isize % w, k as isize / w);
-        NEIGHBOURS.iter().filter_map(move |&(di, dj, d)| {
-            let inside = (0..w).contains(&(i + di)) && (0..h).contains(&(j + dj));
-            inside.then(|| ((k as isize + dj * w + di) as usize, d * self.spacing))
+        let [w, h] = self.size.map(|n| n as u32);
+        let (i, j) = (k as u32 % w, k as u32 / w);
+        NEIGHBOURS.iter().filter_map(move |&(di, dj, distance)| {
+            // Left of 0 wraps to beyond the width.
+            let (i, j) = (i.wrapping_add_signed(di), j.wrapping_add_signed(dj));
+            (i < w && j < h).then(|| (j as usize * w as usize + i as usize, distance * self.spacing))
         })
     }
 }
@@ -96,10 +105,13 @@ impl Flow {
     /// plains of rubble.
     pub fn new(grid: Grid, height: &[f64], slope: f64) -> Self {
         const UNSEEN: u32 = u32::MAX;
-        let mut flow =
-            Self { order: Vec::with_capacity(grid.len()), level: height.to_vec(), parent: vec![UNSEEN; grid.len()] };
+        let mut flow = Self {
+            order: Vec::with_capacity(grid.cells()),
+            level: height.to_vec(),
+            parent: vec![UNSEEN; grid.cells()],
+        };
         let mut shore = BinaryHeap::new();
-        for k in (0..grid.len()).filter(|&k| grid.is_border(k)) {
+        for k in (0..grid.cells()).filter(|&k| grid.is_border(k)) {
             flow.parent[k] = k as u32;
             shore.push(Reverse(Shore { level: height[k], cell: k as u32 }));
         }
@@ -117,6 +129,7 @@ impl Flow {
     }
 
     /// The cells that `k` drains to, with their share (the shares sum to 1) and distance; none on the border.
+    #[inline]
     pub fn receivers(&self, grid: Grid, k: usize) -> Receivers {
         let mut out = Receivers { cells: [(0, 0.0, 0.0); 8], count: 0 };
         if self.parent[k] as usize == k {
@@ -144,7 +157,7 @@ impl Flow {
 
     /// Area drained through each cell, its own included, m².
     pub fn area(&self, grid: Grid) -> Vec<f64> {
-        let mut area = vec![grid.spacing * grid.spacing; grid.len()];
+        let mut area = vec![grid.spacing * grid.spacing; grid.cells()];
         for &k in self.order.iter().rev() {
             for &(n, share, _) in self.receivers(grid, k as usize).iter() {
                 area[n] += area[k as usize] * share;

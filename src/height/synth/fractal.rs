@@ -3,6 +3,8 @@
 //! Musgrave's "ridged multifractal" in Ebert et al., "Texturing & Modeling" (2003): the detail of each octave is
 //! weighted by the octave before it; the place is warped first, after Quílez, "Domain warping" (2002).
 
+use rayon::prelude::*;
+
 use super::noise;
 use crate::height::{Field, Holes, Samples};
 
@@ -19,7 +21,7 @@ const RELIEF: f64 = 2400.0;
 pub fn fractal(size: [u32; 2], seed: u64) -> Field {
     let [w, h] = size.map(u64::from);
     let place = |k: u64| [(k % w) as f64, (k / w) as f64].map(|t| t * SPACING / WAVELENGTH);
-    let heights = (0..w * h).map(|k| (height(place(k), seed) * RELIEF) as f32);
+    let heights = (0..w * h).into_par_iter().map(|k| (height(place(k), seed) * RELIEF) as f32);
     let samples = Samples::F32(heights.collect());
     let holes = Holes::none(samples.len());
     Field::new(samples, size, [SPACING; 2], holes)

@@ -1,5 +1,5 @@
 //! Height fields from a formula. The same seed gives the same bytes on every machine: only integer hashing and
-//! + − × ÷ sqrt floor of f64 in a written order, on one thread.
+//! + − × ÷ sqrt floor of f64 in a written order, and threads only where no value depends on another.
 
 mod eroded;
 pub mod flow;

@@ -1,6 +1,8 @@
 //! The field on which other terrain renderers were measured, bit for bit: heterogeneous fractal noise, ten octaves
 //! of wavelengths 1024 to 2 samples, the middle ones ridged; an infinite landscape of which any size is a crop.
 
+use rayon::prelude::*;
+
 use super::noise;
 use crate::height::{Field, Holes, Samples};
 
@@ -14,7 +16,7 @@ const RELIEF: f32 = 400.0;
 pub fn peers(size: [u32; 2], seed: u64) -> Field {
     let place = |k: u64| [(k % u64::from(size[0])) as f64, (k / u64::from(size[0])) as f64];
     let code = |k| (height(place(k), seed) * 65535.0 + 0.5).floor() as u16;
-    let codes: Vec<u16> = (0..u64::from(size[0]) * u64::from(size[1])).map(code).collect();
+    let codes: Vec<u16> = (0..u64::from(size[0]) * u64::from(size[1])).into_par_iter().map(code).collect();
     let holes = Holes::none(codes.len());
     Field::new(Samples::Coded { codes, zero: 0.0, scale: RELIEF / 65535.0 }, size, [1.0; 2], holes)
 }

@@ -22,7 +22,8 @@ pub fn settle(rock: &Rock, grid: Grid, height: &mut Vec<f64>) {
     sag(rock, grid, height, 400.0, rock.seed ^ 0x60);
     *height = Flow::new(grid, height, PLAIN).level;
     (0..2).for_each(|_| creep(grid, height));
-    sag(rock, grid, height, 150.0, rock.seed ^ 0x70);
+    roughen(rock, grid, height);
+    sag(rock, grid, height, 200.0, rock.seed ^ 0x70);
     *height = Flow::new(grid, height, 0.0).level;
 }
 
@@ -34,9 +35,9 @@ fn widen(rock: &Rock, grid: Grid, height: &mut [f64]) {
         let [x, z] = rock.place(grid, k, 1100.0);
         WIDTH * area[k].sqrt() * (1.0 + 0.6 * noise::gradient(x, z, rock.seed ^ 0x50))
     };
-    let mut nearest = vec![(f64::INFINITY, 0); grid.len()];
+    let mut nearest = vec![(f64::INFINITY, 0); grid.cells()];
     let mut front = BinaryHeap::new();
-    for k in (0..grid.len()).filter(|&k| half_width(k) > 2.0 * grid.spacing) {
+    for k in (0..grid.cells()).filter(|&k| half_width(k) > 2.0 * grid.spacing) {
         nearest[k] = (0.0, k);
         front.push((Reverse(0), k));
     }
@@ -68,11 +69,26 @@ fn creep(grid: Grid, height: &mut [f64]) {
     const BARE: f64 = 1300.0;
     let old = height.to_vec();
     let w = grid.size[0];
-    for k in (0..grid.len()).filter(|&k| !grid.is_border(k)) {
+    for k in (0..grid.cells()).filter(|&k| !grid.is_border(k)) {
         let straight = old[k - 1] + old[k + 1] + old[k - w] + old[k + w];
         let diagonal = old[k - w - 1] + old[k - w + 1] + old[k + w - 1] + old[k + w + 1];
         let soil = 1.0 - (old[k] / BARE).clamp(0.0, 0.8);
         height[k] += 0.6 * soil * ((4.0 * straight + diagonal) / 20.0 - old[k]);
+    }
+}
+
+/// Gives walls their ribs, and plains the ground swell that makes a river wander.
+fn roughen(rock: &Rock, grid: Grid, height: &mut [f64]) {
+    const STEEP: [f64; 2] = [0.5, 1.0];
+    let old = height.to_vec();
+    let w = grid.size[0];
+    for k in (0..grid.cells()).filter(|&k| !grid.is_border(k)) {
+        let (x, z) = ((old[k + 1] - old[k - 1]) / 2.0, (old[k + w] - old[k - w]) / 2.0);
+        let slope = (x * x + z * z).sqrt() / grid.spacing;
+        let bare = ((slope - STEEP[0]) / (STEEP[1] - STEEP[0])).clamp(0.0, 1.0);
+        let ribs = noise::ridged(rock.place(grid, k, 170.0), 2, rock.seed ^ 0x80);
+        let swell = noise::fractal(rock.place(grid, k, 700.0), 3, rock.seed ^ 0x90);
+        height[k] += 9.0 * bare * ribs + 2.5 * swell;
     }
 }
 

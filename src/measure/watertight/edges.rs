@@ -19,12 +19,43 @@ pub struct BorderEdge {
     pub triangle: u32,
 }
 
-/// An edge for sorting: both directions come together.
+/// An edge with its triangle as one number, which sorts fast: from the top the two ends as [`packed`], the
+/// direction (0 from the smaller end to the greater), the triangle (31 bits).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Edge {
-    ends: [[i32; 2]; 2],
-    backward: bool,
-    triangle: u32,
+struct Edge(u128);
+
+impl Edge {
+    fn new(from: [i32; 2], to: [i32; 2], triangle: u32) -> Self {
+        let [from, to] = [packed(from), packed(to)].map(u128::from);
+        let (low, high, backward) = if from < to { (from, to, 0) } else { (to, from, 1) };
+        Self(low << 80 | high << 32 | backward << 31 | u128::from(triangle))
+    }
+
+    fn ends(self) -> [[i32; 2]; 2] {
+        [80, 32].map(|shift| unpacked((self.0 >> shift) as u64))
+    }
+
+    fn same_ends(&self, other: &Edge) -> bool {
+        self.0 >> 32 == other.0 >> 32
+    }
+
+    fn is_backward(self) -> bool {
+        self.0 >> 31 & 1 == 1
+    }
+
+    fn triangle(self) -> u32 {
+        self.0 as u32 & (u32::MAX >> 1)
+    }
+}
+
+/// A lattice position in 48 bits.
+pub fn packed([x, z]: [i32; 2]) -> u64 {
+    (x as u64) << 24 | z as u64
+}
+
+/// The lattice position in the last 48 bits.
+pub fn unpacked(bits: u64) -> [i32; 2] {
+    [24, 0].map(|shift| (bits >> shift & 0xff_ffff) as i32)
 }
 
 /// The edges without a partner. Refuted if a directed edge occurs twice.
@@ -32,18 +63,18 @@ pub fn border(triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample
     let mut edges: Vec<Edge> = (0u32..).zip(triangles).flat_map(|(k, t)| edges_of(k, t)).collect();
     edges.par_sort_unstable();
     let mut border = Vec::new();
-    for uses in edges.chunk_by(|a, b| a.ends == b.ends) {
+    for uses in edges.chunk_by(Edge::same_ends) {
         match uses {
             [only] => {
-                let [low, high] = only.ends;
-                let (from, to) = if only.backward { (high, low) } else { (low, high) };
-                border.push(BorderEdge { from, to, triangle: only.triangle });
+                let [low, high] = only.ends();
+                let (from, to) = if only.is_backward() { (high, low) } else { (low, high) };
+                border.push(BorderEdge { from, to, triangle: only.triangle() });
             }
-            [forth, back] if forth.backward != back.backward => {}
+            [forth, back] if forth.is_backward() != back.is_backward() => {}
             _ => {
-                let twice = if uses[0].backward == uses[1].backward { &uses[..2] } else { &uses[1..3] };
-                let text = format!("edge {:?} used {} times", uses[0].ends, uses.len());
-                return refuted(Kind::Overlap, triangles, twice.iter().map(|e| e.triangle), text);
+                let twice = if uses[0].is_backward() == uses[1].is_backward() { &uses[..2] } else { &uses[1..3] };
+                let text = format!("edge {:?} used {} times", uses[0].ends(), uses.len());
+                return refuted(Kind::Overlap, triangles, twice.iter().map(|e| e.triangle()), text);
             }
         }
     }
@@ -52,7 +83,7 @@ pub fn border(triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample
 
 fn edges_of(k: u32, triangle: &Drawn) -> [Edge; 3] {
     let [a, b, c] = triangle.corners.map(|corner| [corner.x, corner.z]);
-    [(a, b), (b, c), (c, a)].map(|(p, q)| Edge { ends: [p.min(q), p.max(q)], backward: p > q, triangle: k })
+    [Edge::new(a, b, k), Edge::new(b, c, k), Edge::new(c, a, k)]
 }
 
 /// Refuted if an end of a border edge lies strictly inside another border edge.

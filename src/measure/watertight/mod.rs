@@ -80,9 +80,13 @@ pub struct Proof {
     pub border_edges: usize,
 }
 
-/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 200 bytes a triangle
+/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 100 bytes a triangle
 /// while it runs.
+///
+/// # Panics
+/// If the field has more than 2^24 samples a side, or there are more than 2^31 triangles.
 pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Proof, Box<CounterExample>> {
+    assert!(field.size().iter().all(|&n| n <= 1 << 24) && triangles.len() <= 1 << 31);
     on_the_field(field, triangles)?;
     faces_up(triangles)?;
     one_height_a_vertex(triangles)?;
@@ -124,18 +128,19 @@ fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
 }
 
 fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    let mut vertices: Vec<([i32; 2], u32, u32)> = (0u32..)
-        .zip(triangles)
-        .flat_map(|(k, t)| t.corners.map(|corner| ([corner.x, corner.z], corner.y.to_bits(), k)))
-        .collect();
+    // Position, height, triangle as one number, which sorts fast.
+    let vertex = |corner: Corner, k: u32| {
+        let position = u128::from(edges::packed([corner.x, corner.z]));
+        position << 64 | u128::from(corner.y.to_bits()) << 32 | u128::from(k)
+    };
+    let mut vertices: Vec<u128> =
+        (0u32..).zip(triangles).flat_map(|(k, t)| t.corners.map(|corner| vertex(corner, k))).collect();
     vertices.par_sort_unstable();
-    match vertices.windows(2).find(|v| v[0].0 == v[1].0 && v[0].1 != v[1].1) {
-        Some(&[([x, z], low, a), (_, high, b)]) => {
-            let [low, high] = [low, high].map(f32::from_bits);
-            refuted(Kind::Crack, triangles, [a, b], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
-        }
-        _ => Ok(()),
-    }
+    let differ = |[a, b]: &&[u128; 2]| a >> 64 == b >> 64 && a >> 32 != b >> 32;
+    let Some(&[a, b]) = vertices.array_windows().find(differ) else { return Ok(()) };
+    let [x, z] = edges::unpacked((a >> 64) as u64);
+    let [low, high] = [a, b].map(|v| f32::from_bits((v >> 32) as u32));
+    refuted(Kind::Crack, triangles, [a as u32, b as u32], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
 }
 
 /// Writes triangles as ASCII PLY, world metres.

@@ -2,8 +2,8 @@
 //! the border is a row of straight lines that cut the covered land into trapezoids.
 
 use std::cmp::Ordering;
+use std::ops::Range;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::edges::BorderEdge;
@@ -119,17 +119,22 @@ fn crossings(edge: &BorderEdge) -> impl Iterator<Item = Crossing> + use<> {
     (north[1]..south[1]).map(move |band| Crossing { band, line: [at(band), at(band + 1)], enters, triangle })
 }
 
+/// Open cells looked at together before each by itself.
+const RUN: i32 = 64;
+
 /// Refuted if land with data that may be in sight is not covered.
 pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), Box<CounterExample>> {
     let bands = 0..field.size()[1] as i32 - 1;
     let missing = bands.into_par_iter().find_map_first(|band| {
         let first = strips.partition_point(|s| s.band < band);
         let strips = &strips[first..first + strips[first..].partition_point(|s| s.band == band)];
-        open_cells(field, strips).find_map(|i| {
-            let shows = |t: &[[i32; 2]; 3]| {
-                is_land(field, t) && !strips.iter().any(|s| s.contains(t)) && may_be_seen(field, frustum, t)
-            };
-            rtin::cell(i, band).into_iter().find(shows)
+        let shows = |t: &[[i32; 2]; 3]| {
+            is_land(field, t) && !strips.iter().any(|s| s.contains(t)) && may_be_seen(field, frustum, *t)
+        };
+        open_runs(field, strips).find_map(|run| {
+            let samples = (run.start..=run.end).flat_map(|x| [[x, band], [x, band + 1]]);
+            let mut cells = run.flat_map(|i| rtin::cell(i, band));
+            may_be_seen(field, frustum, samples).then(|| cells.find(shows)).flatten()
         })
     });
     let Some(triangle) = missing else { return Ok(()) };
@@ -139,15 +144,15 @@ pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), 
 }
 
 /// Cells of a band that are not wholly inside one of its strips.
-fn open_cells(field: &Field, strips: &[Strip]) -> impl Iterator<Item = i32> {
+fn open_runs(field: &Field, strips: &[Strip]) -> impl Iterator<Item = Range<i32>> {
     let last = field.size()[0] as i32 - 1;
     let ends = strips.iter().map(Strip::whole_cells).chain([(last, last)]);
-    ends.scan(0, |next, (first, end)| {
-        let open = *next..first;
+    let gaps = ends.scan(0, |next, (first, end)| {
+        let gap = *next..first;
         *next = end.max(*next);
-        Some(open)
-    })
-    .flatten()
+        Some(gap)
+    });
+    gaps.flat_map(|gap| gap.clone().step_by(RUN as usize).map(move |first| first..(first + RUN).min(gap.end)))
 }
 
 impl Strip {
@@ -166,7 +171,9 @@ impl Strip {
     }
 }
 
-fn may_be_seen(field: &Field, frustum: &Frustum, triangle: &[[i32; 2]; 3]) -> bool {
-    let [a, b, c]: [DVec3; 3] = triangle.map(|[x, z]| field.world(x as u32, z as u32));
-    frustum.contains(&Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }) != Containment::Outside
+/// Whether the box around samples is at least partly inside the frustum.
+fn may_be_seen(field: &Field, frustum: &Frustum, samples: impl IntoIterator<Item = [i32; 2]>) -> bool {
+    let points = samples.into_iter().map(|[x, z]| field.world(x as u32, z as u32));
+    let bounds = points.map(|p| Aabb { min: p, max: p }).reduce(|a, b| a.union(&b));
+    bounds.is_some_and(|bounds| frustum.contains(&bounds) != Containment::Outside)
 }

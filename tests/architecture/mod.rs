@@ -1,0 +1,157 @@
+//! The arrows: which module may use which, where the device may be named, and how long a file may be.
+
+mod paths;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Longest source file, lines.
+const LONGEST: usize = 500;
+
+/// Every module at the top of the crate, and those it may use.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("view", &[]),
+    ("height", &[]),
+    ("draw", &["view", "height"]),
+    ("lod", &["view", "height", "draw", "texture"]),
+    ("texture", &["view", "height", "draw"]),
+    ("plan", &["view", "height", "draw"]),
+    ("gpu", &["view", "height", "draw", "plan"]),
+    ("measure", &["view", "height", "draw"]),
+    ("cli", EVERYTHING),
+    ("bench", BELOW_REPORT),
+    ("profile", BELOW_REPORT),
+    ("stress", BELOW_REPORT),
+    ("viewer", BELOW_REPORT),
+    // Rows in, pages out: it draws a report again on any machine.
+    ("report", &["bench", "profile", "stress", "measure"]),
+];
+
+const BELOW_REPORT: &[&str] =
+    &["view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "bench", "profile", "stress", "viewer"];
+
+/// The command line starts whatever there is, the report too.
+const EVERYTHING: &[&str] = &[
+    "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "bench", "profile", "stress", "viewer",
+    "report",
+];
+
+/// What is wrong with a file of `src`, each as `file:line: what`. `file` is relative to `src`.
+fn violations(file: &str, text: &str) -> Vec<String> {
+    let code = paths::without_comments(text);
+    let module = paths::module_of(file);
+    let mut found = Vec::new();
+    let mut report = |line: usize, what: String| found.push(format!("src/{file}:{line}: {what}"));
+    if !text.starts_with("//!") {
+        report(1, "a file opens with //!".into());
+    }
+    let lines = text.lines().count();
+    if lines > LONGEST {
+        report(LONGEST + 1, format!("{lines} lines, more than {LONGEST}"));
+    }
+    for (line, target) in paths::used(&code, &module) {
+        if let Some(what) = forbidden(&module, &target) {
+            report(line, what);
+        }
+    }
+    if module.first().is_none_or(|top| top != "gpu") {
+        for word in ["unsafe", "ash"] {
+            for line in paths::lines_with_word(&code, word) {
+                report(line, format!("`{word}` outside gpu"));
+            }
+        }
+    }
+    found.dedup();
+    found
+}
+
+/// Why a module may not use a path of the crate, if so.
+fn forbidden(module: &[String], target: &[String]) -> Option<String> {
+    // The crate's root declares all modules, and the program's calls the command line.
+    let (from, to) = (module.first()?, target.first()?);
+    if from == to {
+        let rooms = (module.get(1)?, target.get(1)?);
+        let is_room = |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
+        let meet = from == "lod" && rooms.0 != rooms.1 && is_room(rooms.0) && is_room(rooms.1);
+        return meet.then(|| format!("room {} uses room {}", rooms.0, rooms.1));
+    }
+    let known = |name: &str| ARROWS.iter().find(|(module, _)| *module == name);
+    match known(from) {
+        None => Some(format!("module {from} has no row in the table of arrows")),
+        Some((_, allowed)) if known(to).is_some() && !allowed.contains(&to.as_str()) => {
+            Some(format!("{from} may not use {to}"))
+        }
+        _ => None,
+    }
+}
+
+#[test]
+fn every_file_keeps_the_arrows() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    collect(&src, &mut files);
+    assert!(files.len() > 10, "the sources were found");
+    let check = |path: &PathBuf| {
+        let text = fs::read_to_string(path).expect("a readable source");
+        let file = path.strip_prefix(&src).expect("a file of src").to_string_lossy().replace('\\', "/");
+        violations(&file, &text)
+    };
+    let found: Vec<String> = files.iter().flat_map(check).collect();
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder of sources") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            collect(&path, files);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// A rule that cannot fail proves nothing: each one on a made-up file.
+#[test]
+fn made_up_violations_are_found() {
+    let cases = [
+        ("view.rs", "use crate::height::Field;", "view may not use height"),
+        ("draw/expand.rs", "use crate::{view::View, lod::{self, Entry}};", "draw may not use lod"),
+        ("lod/mod.rs", "fn f() { crate::gpu::draw() }", "lod may not use gpu"),
+        ("lod/geomipmap/mod.rs", "use super::brute_force;", "room geomipmap uses room brute_force"),
+        ("lod/geomipmap/mesh.rs", "use super::super::brute_force::ENTRY;", "room geomipmap uses room brute_force"),
+        ("lod/brute_force.rs", "use crate::lod::{Entry, geomipmap::blocks};", "room brute_force uses room geomipmap"),
+        ("measure/mod.rs", "pub use crate::lod::Technique;", "measure may not use lod"),
+        ("gpu/frame.rs", "use super::super::lod;", "gpu may not use lod"),
+        ("report/mod.rs", "use crate::gpu;", "report may not use gpu"),
+        ("viewer/mod.rs", "use crate::report;", "viewer may not use report"),
+        ("cellar/mod.rs", "use crate::view::View;", "module cellar has no row in the table of arrows"),
+        ("lod/mod.rs", "unsafe { *p }", "`unsafe` outside gpu"),
+        ("measure/mod.rs", "use ash::vk;", "`ash` outside gpu"),
+    ];
+    for (file, line, what) in cases {
+        let text = format!("//! Made up.\n\n{line}\n");
+        assert_eq!(violations(file, &text), [format!("src/{file}:3: {what}")]);
+    }
+    assert_eq!(violations("view.rs", "use glam::DVec3;\n"), ["src/view.rs:1: a file opens with //!"]);
+    let long = format!("//! Long.\n{}", "\n".repeat(LONGEST));
+    assert_eq!(violations("view.rs", &long), [format!("src/view.rs:501: 501 lines, more than {LONGEST}")]);
+}
+
+#[test]
+fn what_is_allowed_is_not_reported() {
+    let cases = [
+        ("gpu/memory.rs", "use ash::vk;\nuse crate::draw::DrawList;\nfn f() { unsafe { g() } }"),
+        (
+            "lod/geomipmap/mod.rs",
+            "use super::{Entry, settings::Settings};\nuse self::mesh::side;\nuse crate::lod::geomipmap::levels;",
+        ),
+        ("lod/mod.rs", "pub mod geomipmap;\nconst T: &[Entry] = &[geomipmap::ENTRY];"),
+        ("view.rs", "// crate::gpu is unsafe, as ash is.\n\nconst S: &str = \"hash, unsafely\";"),
+        ("view.rs", "mod tests {\n    use super::*;\n}"),
+        ("lib.rs", "pub mod view;\n\npub mod lod;"),
+    ];
+    for (file, text) in cases {
+        assert_eq!(violations(file, &format!("//! Made up.\n{text}\n")), [""; 0], "{file}: {text}");
+    }
+}

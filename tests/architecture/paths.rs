@@ -1,0 +1,93 @@
+//! Paths within the crate, found in source text without a parser: enough for sources that rustfmt has been at.
+
+/// The text with line comments cut off (`://` begins none); the sources have no others.
+pub fn without_comments(text: &str) -> String {
+    let code = |line: &str| {
+        let is_comment = |at: &usize| !line[..*at].ends_with(':');
+        let end = line.match_indices("//").map(|(at, _)| at).find(is_comment).unwrap_or(line.len());
+        format!("{}\n", &line[..end])
+    };
+    text.lines().map(code).collect()
+}
+
+/// The path of the module that a file of `src` holds: `lod/geomipmap/mod.rs` is `lod::geomipmap`.
+pub fn module_of(file: &str) -> Vec<String> {
+    let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
+    let is_root = ["lib", "main"].contains(&path);
+    path.split('/').filter(|_| !is_root).map(str::to_string).collect()
+}
+
+/// Every path that begins with `crate` or `super`, resolved from the crate's root, with its line. Inside an
+/// inline module `super` is resolved as in the file around it.
+pub fn used(code: &str, module: &[String]) -> Vec<(usize, Vec<String>)> {
+    let mut found = Vec::new();
+    let starts = words(code).filter(|&(at, word)| {
+        ["crate", "super"].contains(&word) && code[at + word.len()..].starts_with("::") && !code[..at].ends_with("::")
+    });
+    for (at, _) in starts {
+        let mut base = module.to_vec();
+        let mut rest = &code[at..];
+        while let Some(above) = rest.strip_prefix("super::") {
+            base.pop();
+            rest = above;
+        }
+        if let Some(root) = rest.strip_prefix("crate::") {
+            base.clear();
+            rest = root;
+        }
+        let mut paths = Vec::new();
+        tree(rest, &base, &mut paths);
+        let line = code[..at].matches('\n').count() + 1;
+        found.extend(paths.into_iter().map(|path| (line, path)));
+    }
+    found
+}
+
+/// Adds the paths of a use tree to `paths` and returns what follows the tree.
+fn tree<'a>(text: &'a str, base: &[String], paths: &mut Vec<Vec<String>>) -> &'a str {
+    let text = text.trim_start();
+    if let Some(mut rest) = text.strip_prefix('{') {
+        loop {
+            rest = tree(rest, base, paths).trim_start();
+            match rest.strip_prefix(',') {
+                Some(next) => rest = next,
+                None => return rest.strip_prefix('}').unwrap_or(rest),
+            }
+        }
+    }
+    let end = text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
+    let (name, rest) = text.split_at(end);
+    let mut path = base.to_vec();
+    if !["", "self"].contains(&name) {
+        path.push(name.to_string());
+    }
+    match rest.strip_prefix("::") {
+        Some(next) if !name.is_empty() => tree(next, &path, paths),
+        _ => {
+            paths.push(path);
+            // `*`, and a new name, belong to the path.
+            let rest = rest.strip_prefix('*').unwrap_or(rest);
+            rest.strip_prefix(" as ")
+                .map_or(rest, |new| new.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_'))
+        }
+    }
+}
+
+/// Lines, from 1, that hold the whole word.
+pub fn lines_with_word(code: &str, word: &str) -> Vec<usize> {
+    let found = words(code).filter(|&(_, w)| w == word);
+    found.map(|(at, _)| code[..at].matches('\n').count() + 1).collect()
+}
+
+/// Identifiers and keywords with their positions.
+fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        at += code[at..].find(is_word)?;
+        let word = &code[at..];
+        let word = &word[..word.find(|c| !is_word(c)).unwrap_or(word.len())];
+        at += word.len();
+        Some((at - word.len(), word))
+    })
+}

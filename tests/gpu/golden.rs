@@ -1,0 +1,48 @@
+//! Golden pictures of every technique, 96 × 64: at most 0.1 % of pixels may differ by more than 5/255.
+//! `UPDATE_GOLDEN=1` writes them anew; look at them before they are committed.
+
+use std::path::{Path, PathBuf};
+
+use cuesta::gpu::Gpu;
+use cuesta::lod;
+use cuesta::plan::{Colour, Look, ScenePlan};
+
+use super::{aslant, difference, mountains, on_device, technique};
+
+/// Largest channel difference of a pixel that counts as the same.
+const THRESHOLD: u8 = 5;
+/// Largest share of pixels that may differ by more.
+const SHARE: f64 = 0.001;
+
+fn compare(gpu: &std::sync::Arc<Gpu>, name: &str, colour: Colour, file: &str) {
+    let field = mountains();
+    let view = aslant(&field, [96, 64], 2.0);
+    let look = Look { colour, ..Look::default() };
+    let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+    let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+    let drawn = scene.shoot(technique(&field, name, &[]).as_mut(), &view).unwrap().picture;
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{file}.png"));
+    if std::env::var("UPDATE_GOLDEN").as_deref() == Ok("1") {
+        drawn.save(&path).unwrap();
+    }
+    let golden = image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).into_rgba8();
+    let (largest, share) = difference(&drawn, &golden, THRESHOLD);
+    if share > SHARE {
+        let folder = std::env::temp_dir();
+        let actual = folder.join(format!("cuesta-{file}-actual.png"));
+        drawn.save(&actual).unwrap();
+        panic!("{file}: {:.2} % of pixels differ, by up to {largest}: see {}", 100.0 * share, actual.display());
+    }
+}
+
+#[test]
+fn every_technique_looks_as_it_did() {
+    on_device(|gpu| {
+        for entry in lod::TECHNIQUES {
+            compare(gpu, entry.name, Colour::Height, entry.name);
+            compare(gpu, entry.name, Colour::Level, &format!("{}-level", entry.name));
+        }
+        compare(gpu, "geomipmap", Colour::Normal, "geomipmap-normal");
+        compare(gpu, "geomipmap", Colour::Error, "geomipmap-error");
+    });
+}

@@ -1,0 +1,137 @@
+//! The whole neck is executed: resident, streamed and uploaded explicit geometry, lists and strips.
+
+use std::sync::Arc;
+
+use cuesta::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Submission, Topology, Upload};
+use cuesta::height::{Field, rtin};
+use cuesta::lod::Technique;
+use cuesta::view::View;
+
+use super::{aslant, mountains, on_device, shoot, technique};
+
+/// All samples as explicit vertices, brought to the device in one of several ways.
+struct Explicit {
+    mesh: Geometry,
+    resident: Geometry,
+    way: Way,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Resident,
+    Streamed,
+    /// Resident geometry that starts as nonsense and is overwritten before it is drawn.
+    Uploaded,
+    /// Streamed as one strip a row of cells.
+    Strips,
+}
+
+impl Explicit {
+    fn new(field: &Field, way: Way) -> Self {
+        let [w, h] = field.size().map(|n| n as i32);
+        let vertices = (0..h).flat_map(|z| (0..w).map(move |x| [x, z]));
+        let vertices: Vec<_> = vertices
+            .map(|[x, z]| {
+                let height = field.height(x as u32, z as u32);
+                // Half way between two wrong heights; exact in f32 for heights of whole halves.
+                ExplicitVertex { position: [x, z], height: height - 64.0, target: height + 64.0, morph: 0.5 }
+            })
+            .collect();
+        let index = |[x, z]: [i32; 2]| (z * w + x) as u32;
+        let cells = (0..h - 1).flat_map(|j| (0..w - 1).flat_map(move |i| rtin::cell(i, j)));
+        let indices: Vec<u32> = match way {
+            Way::Strips => {
+                (0..h - 1).flat_map(|j| (0..w).flat_map(move |i| [index([i, j]), index([i, j + 1])])).collect()
+            }
+            _ => cells.flatten().map(index).collect(),
+        };
+        let mesh = Geometry { vertices, indices, ..Geometry::default() };
+        let resident = match way {
+            Way::Resident => mesh.clone(),
+            Way::Uploaded => Geometry {
+                vertices: vec![ExplicitVertex::default(); mesh.vertices.len()],
+                indices: vec![0; mesh.indices.len()],
+                ..Geometry::default()
+            },
+            Way::Streamed | Way::Strips => Geometry::default(),
+        };
+        Self { mesh, resident, way }
+    }
+}
+
+impl Technique for Explicit {
+    fn resident(&self) -> &Geometry {
+        &self.resident
+    }
+
+    fn limits(&self) -> Limits {
+        let bytes = size_of_val(self.mesh.vertices.as_slice()) + size_of_val(self.mesh.indices.as_slice());
+        Limits {
+            draws: 1000,
+            instances: 1,
+            vertices: self.mesh.vertices.len(),
+            indices: self.mesh.indices.len(),
+            upload_bytes: bytes,
+        }
+    }
+
+    fn select(&mut self, _: &View, list: &mut DrawList) {
+        list.instances.push(Instance::default());
+        let (source, topology) = match self.way {
+            Way::Resident | Way::Uploaded => (Source::Resident, Topology::Triangles),
+            Way::Streamed => (Source::Streamed, Topology::Triangles),
+            Way::Strips => (Source::Streamed, Topology::Strip),
+        };
+        let row = 2 * (self.mesh.vertices.last().unwrap().position[0] as usize + 1);
+        let step = if self.way == Way::Strips { row } else { self.mesh.indices.len() };
+        for first in (0..self.mesh.indices.len()).step_by(step) {
+            let indices = first as u32..(first + step) as u32;
+            list.draws.push(Draw { source, topology, indices, instances: 0..1 });
+        }
+        if source == Source::Streamed {
+            list.streamed = self.mesh.clone();
+        }
+        if self.way == Way::Uploaded {
+            list.uploads.push(Upload::Vertices(0, self.mesh.vertices.clone()));
+            list.uploads.push(Upload::Indices(0, self.mesh.indices.clone()));
+            list.submission = Submission::Direct;
+        }
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+}
+
+/// Heights of whole metres, so that morphing them is exact.
+fn whole_metres() -> Arc<Field> {
+    let land = mountains();
+    let heights = (0..land.samples().len()).map(|k| land.samples().height(k).round()).collect();
+    Arc::new(Field::new(cuesta::height::Samples::F32(heights), land.stored(), land.spacing, land.holes().clone()))
+}
+
+#[test]
+fn explicit_geometry_draws_what_the_lattice_draws() {
+    on_device(|gpu| {
+        let field = whole_metres();
+        let view = aslant(&field, [160, 120], 1.0);
+        let truth = shoot(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
+        for way in [Way::Resident, Way::Streamed, Way::Uploaded] {
+            let shot = shoot(gpu, &field, &mut Explicit::new(&field, way), &view);
+            assert_eq!(shot.picture, truth.picture, "{way:?}");
+        }
+    });
+}
+
+/// Strips have all diagonals one way: the outline is nearly the same, the triangles are as many.
+#[test]
+fn strips_are_drawn() {
+    on_device(|gpu| {
+        let field = whole_metres();
+        let view = aslant(&field, [160, 120], 1.0);
+        let truth = shoot(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
+        let strips = shoot(gpu, &field, &mut Explicit::new(&field, Way::Strips), &view);
+        assert_eq!(strips.list.triangles(), 2 * 130 * 96);
+        assert!(super::difference(&strips.picture, &truth.picture, 40).1 < 0.03);
+    });
+}

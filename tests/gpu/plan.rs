@@ -1,0 +1,73 @@
+//! What a scene does not need is left out, and forcing it in changes nothing that can be seen.
+
+use std::sync::Arc;
+
+use cuesta::height::Field;
+use cuesta::plan::{Colour, DeviceLimits, Look, ScenePlan};
+
+use super::{as_f32, aslant, difference, mountains, on_device, shoot_planned, technique};
+
+fn without_holes() -> Arc<Field> {
+    Arc::new((*mountains()).clone().without_holes())
+}
+
+#[test]
+fn forced_features_show_the_same_picture() {
+    on_device(|gpu| {
+        let field = without_holes();
+        let view = aslant(&field, [160, 120], 1.0);
+        let shoot = |field: &Arc<Field>, plan: &ScenePlan| {
+            shoot_planned(gpu, field, plan, technique(field, "geomipmap", &["block=17"]).as_mut(), &view).picture
+        };
+        let plan = ScenePlan::new(&field, &Look::default(), &gpu.device_limits()).unwrap();
+        assert!(plan.coded && !plan.holes && !plan.tiled && !plan.fog && plan.page_shift == 0 && plan.filtered);
+        let lean = shoot(&field, &plan);
+        let same = |name: &str, forced: ScenePlan| assert_eq!(shoot(&field, &forced), lean, "{name}");
+        same("holes", ScenePlan { holes: true, ..plan.clone() });
+        same("tiling", ScenePlan { tiled: true, ..plan.clone() });
+        // The look's density is 0.
+        same("fog", ScenePlan { fog: true, ..plan.clone() });
+        same("queries", ScenePlan { measured: false, ..plan.clone() });
+        let wide = as_f32(&field);
+        let wide_plan = ScenePlan { coded: false, ..plan.clone() };
+        assert!(difference(&shoot(&wide, &wide_plan), &lean, 2).1 < 0.01, "32-bit heights");
+        let unfiltered = ScenePlan { filtered: false, ..plan.clone() };
+        assert!(difference(&shoot(&field, &unfiltered), &lean, 3).1 < 0.01, "filtering in the shader");
+        let paged = ScenePlan { page_shift: 5, ..unfiltered.clone() };
+        assert_eq!(shoot(&field, &paged), shoot(&field, &unfiltered), "pages");
+    });
+}
+
+#[test]
+fn fog_and_colours_are_seen() {
+    on_device(|gpu| {
+        let field = without_holes();
+        let view = aslant(&field, [96, 64], 1.0);
+        let mut pictures = Vec::new();
+        let looks = [Colour::Height, Colour::Level, Colour::Error, Colour::Normal, Colour::Batch]
+            .map(|colour| Look { colour, ..Look::default() })
+            .into_iter()
+            .chain([Look { fog: 3e-4, ..Look::default() }, Look { wireframe: true, ..Look::default() }]);
+        for look in looks {
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
+            pictures.push((look, scene.shoot(geomipmap.as_mut(), &view).unwrap().picture));
+        }
+        for (k, (look, picture)) in pictures.iter().enumerate() {
+            for (other, other_picture) in &pictures[..k] {
+                assert!(difference(picture, other_picture, 8).1 > 0.05, "{look:?} looks like {other:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_field_beyond_one_image_is_paged_and_one_beyond_all_is_refused_by_name() {
+    let field = mountains();
+    let device = DeviceLimits { image_side: 64, image_layers: 6, filters_heights: true };
+    let plan = ScenePlan::new(&field, &Look::default(), &device).unwrap();
+    assert_eq!((plan.page_size(), plan.pages(), plan.filtered), ([64, 64], [3, 2], false));
+    let refused = ScenePlan::new(&field, &Look::default(), &DeviceLimits { image_layers: 5, ..device }).unwrap_err();
+    assert!(refused.contains("maxImageArrayLayers is 5"), "{refused}");
+}

@@ -1,0 +1,83 @@
+//! `position.glsl` and its CPU twin agree to the bit.
+
+use std::sync::Arc;
+
+use cuesta::draw::layout::{ExplicitVertex, Frame};
+use cuesta::draw::place::{lattice_position, morphed_height, relative_position};
+use cuesta::draw::{DrawList, Instance};
+use cuesta::gpu::Gpu;
+use cuesta::gpu::twin::{self, Query};
+use cuesta::height::Field;
+use cuesta::plan::{Look, ScenePlan};
+
+use super::{as_f32, aslant, mountains, on_device, technique};
+
+/// Every vertex of every third instance that a technique draws, and explicit vertices with morph weights.
+fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View) -> Vec<Query> {
+    let mut geomipmap = technique(field, "geomipmap", &["block=17"]);
+    let mut list = DrawList::default();
+    geomipmap.select(frame_view, &mut list);
+    let lattice = &geomipmap.resident().lattice;
+    let lattice_queries = list.instances.iter().step_by(3).flat_map(|instance| {
+        lattice.iter().map(|v| Query {
+            vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
+            instance: *instance,
+            explicit_height: 0,
+        })
+    });
+    let explicit = (0..2000u32).map(|k| Query {
+        vertex: ExplicitVertex {
+            position: [(k % 37) as i32, (k / 37) as i32],
+            height: 1234.567 + 0.37 * k as f32,
+            target: 1200.0 + 1.7 * k as f32,
+            morph: k as f32 / 1999.0,
+        },
+        instance: Instance { origin: [5, 3], cells: 64, shift: k % 2, turns: k % 4, ..Instance::default() },
+        explicit_height: 1,
+    });
+    lattice_queries.chain(explicit).collect()
+}
+
+fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
+    let at = lattice_position(frame, &query.instance, query.vertex.position);
+    let vertex = &query.vertex;
+    let height = match query.explicit_height {
+        0 => field.height(at[0] as u32, at[1] as u32),
+        _ => morphed_height(vertex.height, vertex.target, vertex.morph),
+    };
+    relative_position(frame, at, height)
+}
+
+fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
+    let view = aslant(field, [320, 200], 2.0);
+    let frame = Frame::placing(field, &view);
+    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap();
+    plan.page_shift = page_shift;
+    let queries = queries(field, &view);
+    let device = twin::positions(gpu, &plan, field, &frame, &queries).unwrap();
+    for (query, there) in queries.iter().zip(device) {
+        let here = on_the_cpu(field, &frame, query);
+        assert_eq!(
+            here.map(f32::to_bits),
+            there.map(f32::to_bits),
+            "{name}: {here:?} {there:?} {query:?}",
+            query = query.vertex
+        );
+    }
+}
+
+#[test]
+fn vertices_lie_where_the_cpu_says_to_the_bit() {
+    on_device(|gpu| {
+        let coded = mountains();
+        compare(gpu, "16-bit", &coded, 0);
+        compare(gpu, "32-bit", &as_f32(&coded), 0);
+        compare(gpu, "pages of 32", &coded, 5);
+        let mut far = (*coded).clone();
+        far.origin = [4.0e6, -7.0e6];
+        far.spacing = [0.3, 31.7];
+        compare(gpu, "far, narrow cells", &Arc::new(far), 0);
+        compare(gpu, "tiled", &Arc::new((*coded).clone().tiled([3, 2])), 0);
+        compare(gpu, "tiled pages", &Arc::new((*coded).clone().tiled([3, 2])), 6);
+    });
+}
