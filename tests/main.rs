@@ -7,3 +7,5 @@ mod gpu;
 mod height;
 mod measure;
 mod synth;
+#[cfg(feature = "viewer")]
+mod viewer;

@@ -9,7 +9,7 @@ use egui::{Align2, Color32, Context, FontId, LayerId, Painter, Pos2, RawInput, R
 use super::bindings::Binding;
 
 const TEXT: Color32 = Color32::from_rgb(240, 240, 235);
-const FAINT: Color32 = Color32::from_rgb(170, 180, 190);
+const FAINT: Color32 = Color32::from_rgb(180, 192, 204);
 const TITLE: Color32 = Color32::from_rgb(255, 214, 130);
 const SIZE: f32 = 13.0;
 const MARGIN: f32 = 8.0;
@@ -100,7 +100,7 @@ fn table(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, ro
     let gap = if values.size().x > 0.0 { MARGIN * 2.0 } else { 0.0 };
     let inner = Vec2::new(names.size().x + gap + values.size().x, head + names.size().y);
     let plate = align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN));
-    painter.rect_filled(plate, 4.0, Color32::from_black_alpha(190));
+    painter.rect_filled(plate, 4.0, Color32::from_black_alpha(232));
     let corner = plate.min + Vec2::splat(MARGIN);
     if let Some(galley) = title {
         painter.galley(corner, galley, TITLE);

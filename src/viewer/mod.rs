@@ -11,7 +11,7 @@ pub mod times;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use winit::event_loop::EventLoop;
 
 use crate::gpu::Choice;
@@ -69,7 +69,9 @@ pub struct Summary {
 
 /// Opens the window and returns when it is closed.
 pub fn run(setup: &Setup) -> Result<Summary> {
-    let event_loop = EventLoop::<Stop>::with_user_event().build().context("no window system")?;
+    let event_loop = EventLoop::<Stop>::with_user_event().build();
+    // The window system's own words name its source files, and nothing that helps.
+    let event_loop = event_loop.map_err(|_| anyhow!("no window: the display cannot be reached"))?;
     let proxy = event_loop.create_proxy();
     // A second handler in one process is refused; then Ctrl-C ends the process as it always did.
     let _ = ctrlc::set_handler(move || {

@@ -120,9 +120,12 @@ impl Session {
         Request::Technique
     }
 
-    /// Moves the camera, and takes the last frame's figures.
+    /// Moves the camera, and takes the last frame's figures. After a break `dt` is 0: there was no frame.
     pub fn advance(&mut self, setup: &Setup, motion: &Motion, figures: &Figures, dt: f64) {
         self.camera.advance(&setup.field, motion, dt);
+        if dt == 0.0 {
+            return;
+        }
         self.frame.add(dt * 1e3, dt);
         self.select.add(figures.select_ms, dt);
         self.gpu.add(figures.gpu_ms, dt);
@@ -169,12 +172,13 @@ impl Session {
         }
         let row = |name: &str, value: String| (name.to_string(), value);
         let frame = self.frame.get();
+        let rate = if frame > 0.0 { 1e3 / frame } else { 0.0 };
         let [x, y, z] = self.camera.eye.to_array();
         let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
         let frozen = if self.frozen { ", frozen" } else { "" };
         let wire = if self.look.wireframe { ", edges" } else { "" };
         vec![
-            row("frame", format!("{frame:.1} ms, {:.0} a second", 1e3 / frame.max(1e-3))),
+            row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
             row("select", format!("{:.2} ms", self.select.get())),
             row("gpu", format!("{:.1} ms", self.gpu.get())),
             row("triangles", grouped(figures.triangles)),
