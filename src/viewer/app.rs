@@ -127,7 +127,8 @@ impl<'a> App<'a> {
         let content = Content {
             rows: self.session.rows(self.setup, &open.stage.figures),
             help: self.session.helps.then_some(self.bindings.as_slice()),
-            note: self.session.note(),
+            // A screenshot does not tell of the one before.
+            note: self.session.note().filter(|_| !self.session.wants_copy),
         };
         let overlay = hud::paint(&open.context, size, open.window.scale_factor() as f32, &content);
         let Session { look, frozen, wants_copy, .. } = self.session;
