@@ -10,6 +10,7 @@
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
+//! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
 
 pub mod view;
@@ -26,5 +27,8 @@ pub mod plan;
 pub mod gpu;
 
 pub mod measure;
+
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 pub mod cli;

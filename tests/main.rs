@@ -8,3 +8,5 @@ mod gpu;
 mod height;
 mod measure;
 mod synth;
+#[cfg(feature = "viewer")]
+mod viewer;

@@ -113,13 +113,17 @@ fn run(cli: Cli) -> Result<Outcome> {
 fn without_subcommand(common: &Common) -> Result<Outcome> {
     #[cfg(feature = "viewer")]
     if view::has_display() {
-        return view::run(common, &parse_as(&["view", "demo"]));
+        return run_words(common, &["view", "demo"]);
     }
     eprintln!("no display: rendering cuesta.png instead");
-    let Some(Command::Render(args)) = Cli::parse_from(["cuesta", "render", "demo", "-o", "cuesta.png"]).command else {
-        unreachable!("that is the render subcommand")
-    };
-    render::run(common, &args)
+    run_words(common, &["render", "demo", "-o", "cuesta.png"])
+}
+
+/// Runs a subcommand given as words, under the flags that were given.
+#[cfg(feature = "vulkan")]
+fn run_words(common: &Common, words: &[&str]) -> Result<Outcome> {
+    let cli = Cli::try_parse_from(std::iter::once(&"cuesta").chain(words))?;
+    run(Cli { common: common.clone(), ..cli })
 }
 
 #[cfg(not(feature = "vulkan"))]

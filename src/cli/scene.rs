@@ -281,6 +281,13 @@ impl LookArgs {
     }
 }
 
+impl LookArgs {
+    /// The picture there is to lay over the field, whatever the colours say at first.
+    pub fn picture(&self, terrain: &str) -> Result<Option<image::RgbaImage>> {
+        Ok(LookArgs { colour: None, ..self.clone() }.build(terrain)?.1)
+    }
+}
+
 fn read_picture(path: &str) -> Result<image::RgbaImage> {
     let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
     let reader = image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;

@@ -1,1 +1,100 @@
 //! `cuesta view`: the window.
+
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
+use super::{Common, Outcome, render, report};
+use crate::viewer::times::Percentiles;
+use crate::viewer::{self, Setup};
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct ViewerArgs {
+    /// Where heights come from.
+    #[command(flatten)]
+    pub terrain: TerrainArgs,
+    /// The view at the start.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// The technique at the start.
+    #[command(flatten)]
+    pub technique: TechniqueArgs,
+    /// The look at the start.
+    #[command(flatten)]
+    pub look: LookArgs,
+    /// Whether frames wait for the display.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub vsync: Switch,
+    /// Close the window after this many seconds.
+    #[arg(long, value_name = "S")]
+    pub seconds: Option<f64>,
+}
+
+/// On or off.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Switch {
+    /// On.
+    On,
+    /// Off.
+    Off,
+}
+
+#[derive(Serialize)]
+struct Viewed {
+    device: String,
+    frames: u64,
+    seconds: f64,
+    frame_ms: Percentiles,
+    validation_messages: Vec<String>,
+}
+
+/// Whether a window can be opened.
+pub fn has_display() -> bool {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !cfg!(all(unix, not(target_os = "macos"))) || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
+    if !has_display() {
+        bail!("view: there is no display: expected DISPLAY or WAYLAND_DISPLAY to be set");
+    }
+    if args.seconds.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
+        bail!("--seconds: expected a number of seconds");
+    }
+    let field = Arc::new(args.terrain.load(common)?.field);
+    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let summary = viewer::run(&Setup {
+        name: args.terrain.terrain.clone(),
+        view: args.view.build(&field, args.technique.tolerance()?)?,
+        field,
+        near: args.view.near,
+        technique: args.technique.settings()?,
+        choices: args.technique.settings.clone(),
+        overlay: overlay.or(args.look.picture(&args.terrain.terrain)?),
+        look,
+        choice: render::choice(common),
+        validate: common.validate,
+        vsync: args.vsync == Switch::On,
+        seconds: args.seconds,
+        save: render::save,
+    })?;
+    for message in &summary.messages {
+        eprintln!("validation: {}", message.replace('\n', " "));
+    }
+    let viewed = Viewed {
+        device: summary.device,
+        frames: summary.frames,
+        seconds: summary.seconds,
+        frame_ms: summary.frame_ms,
+        validation_messages: summary.messages,
+    };
+    if common.json {
+        report::print(common, &viewed)?;
+    }
+    Ok(if viewed.validation_messages.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
+}

@@ -38,7 +38,7 @@ pub struct Candidate {
     pub driver: String,
     /// What it lacks; empty if it can be used.
     pub missing: Vec<String>,
-    queue_family: u32,
+    pub(super) queue_family: u32,
 }
 
 /// A logical device with one queue and an allocator. Objects made on it hold an `Arc` of it.
@@ -153,7 +153,19 @@ impl Candidate {
 impl Gpu {
     /// Makes a device; `window` adds the swapchain extension.
     pub fn new(instance: &Arc<Instance>, choice: &Choice, window: bool) -> Result<Arc<Self>> {
-        let candidate = choose(instance, choice)?;
+        Self::on(instance, choose(instance, choice, |_| true)?, window)
+    }
+
+    /// Makes a device that can show pictures on a window, as `is_shown_by` says.
+    pub fn for_window(
+        instance: &Arc<Instance>,
+        choice: &Choice,
+        is_shown_by: impl Fn(&Candidate) -> bool,
+    ) -> Result<Arc<Self>> {
+        Self::on(instance, choose(instance, choice, is_shown_by)?, true)
+    }
+
+    fn on(instance: &Arc<Instance>, candidate: Candidate, window: bool) -> Result<Arc<Self>> {
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(candidate.queue_family)
@@ -267,8 +279,11 @@ impl Gpu {
     }
 }
 
-fn choose(instance: &Instance, choice: &Choice) -> Result<Candidate> {
-    let all = candidates(instance)?;
+fn choose(instance: &Instance, choice: &Choice, is_shown_by: impl Fn(&Candidate) -> bool) -> Result<Candidate> {
+    let mut all = candidates(instance)?;
+    for candidate in all.iter_mut().filter(|c| !is_shown_by(c)) {
+        candidate.missing.push("a way to show pictures on this window".to_string());
+    }
     let describe = |c: &Candidate| match c.missing.as_slice() {
         [] => c.name.clone(),
         missing => format!("{} (lacks {})", c.name, missing.join(", ")),

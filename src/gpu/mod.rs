@@ -6,10 +6,14 @@
 
 pub mod device;
 pub mod frames;
+#[cfg(feature = "viewer")]
+pub mod hud;
 pub mod instance;
 pub mod memory;
 pub mod pages;
 pub mod pipelines;
+#[cfg(feature = "viewer")]
+pub mod screenshot;
 pub mod shaders;
 #[cfg(feature = "viewer")]
 pub mod swapchain;

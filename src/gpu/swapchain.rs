@@ -1,1 +1,397 @@
-//! The window.
+//! The window as a target: its surface, the images shown on it, and their way there.
+//!
+//! What is expected — a window resized, hidden, moved to another monitor — is a status, not an error.
+
+use std::ffi::CStr;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail};
+use ash::{khr, vk};
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
+
+use super::device::{Candidate, Gpu};
+use super::frames::{Recording, SLOTS};
+use super::instance::Instance;
+use super::memory::{Image, barriers, image_barrier};
+use super::screenshot::Screenshot;
+use super::target::{Attachment, DEPTH, Formats, depth_image};
+
+/// A window of the system, whoever made it.
+pub trait Window: HasWindowHandle + HasDisplayHandle {}
+
+impl<T: HasWindowHandle + HasDisplayHandle> Window for T {}
+
+/// Instance extensions that windows of this display need.
+pub fn extensions(display: &dyn HasDisplayHandle) -> Result<Vec<&'static CStr>> {
+    let names = ash_window::enumerate_required_extensions(display.display_handle()?.as_raw())
+        .context("no Vulkan surfaces for this kind of display")?;
+    // SAFETY: these are names of extensions, constants of `ash`.
+    Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
+}
+
+/// Vulkan's side of a window. It keeps the window alive.
+pub struct Surface {
+    loader: khr::surface::Instance,
+    raw: vk::SurfaceKHR,
+    instance: Arc<Instance>,
+    window: Arc<dyn Window>,
+}
+
+impl Surface {
+    /// The surface of a window, on an instance that has [`extensions`].
+    pub fn new(instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
+        let (display, handle) = (window.display_handle()?.as_raw(), window.window_handle()?.as_raw());
+        // SAFETY: the window outlives the surface, which holds it, and so does the instance.
+        let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
+            .context("no Vulkan surface for the window")?;
+        let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
+        Ok(Self { loader, raw, instance: Arc::clone(instance), window })
+    }
+
+    /// Whether a device can show pictures on this surface.
+    pub fn is_shown_by(&self, candidate: &Candidate) -> bool {
+        let instance = &self.instance.raw;
+        // SAFETY: device and surface are of the same instance.
+        unsafe {
+            let extensions = instance.enumerate_device_extension_properties(candidate.raw).unwrap_or_default();
+            let has_swapchains = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::swapchain::NAME));
+            let (device, family) = (candidate.raw, candidate.queue_family);
+            has_swapchains && self.loader.get_physical_device_surface_support(device, family, self.raw).unwrap_or(false)
+        }
+    }
+
+    fn formats(&self, device: vk::PhysicalDevice) -> Result<Vec<vk::SurfaceFormatKHR>> {
+        // SAFETY: device and surface are of the same instance.
+        unsafe { self.loader.get_physical_device_surface_formats(device, self.raw) }.context("formats of the window")
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: the swapchain on it is gone: it owns this surface and goes first.
+        unsafe { self.loader.destroy_surface(self.raw, None) };
+    }
+}
+
+/// The images of a window.
+pub struct Swapchain {
+    gpu: Arc<Gpu>,
+    loader: khr::swapchain::Device,
+    raw: vk::SwapchainKHR,
+    format: vk::SurfaceFormatKHR,
+    vsync: bool,
+    size: [u32; 2],
+    images: Vec<Shown>,
+    depth: Option<Image>,
+    can_copy: bool,
+    /// Signalled when a slot's image may be drawn to.
+    acquired: Vec<vk::Semaphore>,
+    state: State,
+    surface: Surface,
+}
+
+/// One of the images.
+struct Shown {
+    image: vk::Image,
+    view: vk::ImageView,
+    /// Signalled when it is drawn. One an image, not one a slot: only the image's return says that the
+    /// presentation engine has waited for it.
+    drawn: vk::Semaphore,
+}
+
+/// Whether the images fit the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Fit,
+    /// They may be shown, but might be made to fit better.
+    Suboptimal,
+    /// They can no longer be shown.
+    Stale,
+    /// The surface itself is gone.
+    Lost,
+}
+
+/// An image to draw to, acquired for one frame.
+pub struct Acquired {
+    /// The attachment for [`super::target::begin`].
+    pub attachment: Attachment,
+    /// What the frame waits for before it draws.
+    pub wait: vk::Semaphore,
+    /// What the frame signals when it is drawn.
+    pub signal: vk::Semaphore,
+    index: u32,
+}
+
+impl Swapchain {
+    /// Images for a surface; made when [`Swapchain::fit`] is first called. `vsync`: never tears, waits for the
+    /// display; otherwise as fast as it can.
+    pub fn new(gpu: &Arc<Gpu>, surface: Surface, vsync: bool) -> Result<Self> {
+        let format = preferred(&surface.formats(gpu.candidate.raw)?)?;
+        let info = vk::SemaphoreCreateInfo::default();
+        // SAFETY: the device is alive; Drop destroys the semaphores.
+        let acquired = (0..SLOTS).map(|_| unsafe { gpu.raw.create_semaphore(&info, None) });
+        let acquired = acquired.collect::<Result<Vec<_>, _>>()?;
+        acquired.iter().for_each(|semaphore| gpu.name(*semaphore, "image acquired"));
+        Ok(Self {
+            gpu: Arc::clone(gpu),
+            loader: khr::swapchain::Device::new(&gpu.instance.raw, &gpu.raw),
+            raw: vk::SwapchainKHR::null(),
+            format,
+            vsync,
+            size: [0; 2],
+            images: Vec::new(),
+            depth: None,
+            can_copy: false,
+            acquired,
+            state: State::Stale,
+            surface,
+        })
+    }
+
+    /// Formats to draw with.
+    pub fn formats(&self) -> Formats {
+        Formats { colour: self.format.format, depth: DEPTH }
+    }
+
+    /// Makes the images fit the window, whose size is `window` where the system leaves that to us. Returns the
+    /// size of a frame, or `None` while there is nothing to draw to: the window is minimised.
+    pub fn fit(&mut self, window: [u32; 2]) -> Result<Option<[u32; 2]>> {
+        if self.state == State::Fit && self.size == window {
+            return Ok(Some(self.size));
+        }
+        if self.state == State::Lost {
+            self.replace_surface()?;
+        }
+        let mut capabilities = self.capabilities();
+        if capabilities.as_ref().is_err_and(|e| *e == vk::Result::ERROR_SURFACE_LOST_KHR) {
+            self.replace_surface()?;
+            capabilities = self.capabilities();
+        }
+        let capabilities = capabilities.context("the window's surface")?;
+        let size = extent(&capabilities, window);
+        if size.contains(&0) {
+            return Ok(None);
+        }
+        if self.state == State::Stale || self.size != size {
+            self.make(&capabilities, size)?;
+        }
+        self.state = State::Fit;
+        Ok(Some(size))
+    }
+
+    fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR, vk::Result> {
+        let device = self.gpu.candidate.raw;
+        // SAFETY: device and surface are of the same instance.
+        unsafe { self.surface.loader.get_physical_device_surface_capabilities(device, self.surface.raw) }
+    }
+
+    /// The surface was lost: a new one of the same window, and no images yet.
+    fn replace_surface(&mut self) -> Result<()> {
+        self.gpu.wait_idle()?;
+        self.destroy_images();
+        // SAFETY: the device is idle and the images' views are gone.
+        unsafe { self.loader.destroy_swapchain(self.raw, None) };
+        self.raw = vk::SwapchainKHR::null();
+        let surface = Surface::new(&self.surface.instance, Arc::clone(&self.surface.window))?;
+        if !surface.is_shown_by(&self.gpu.candidate) {
+            bail!("{} can no longer show pictures on the window", self.gpu.candidate.name);
+        }
+        self.surface = surface;
+        self.state = State::Stale;
+        Ok(())
+    }
+
+    /// Makes the images anew, handing the old ones over.
+    fn make(&mut self, capabilities: &vk::SurfaceCapabilitiesKHR, [width, height]: [u32; 2]) -> Result<()> {
+        self.gpu.wait_idle()?;
+        let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
+        let copy = vk::ImageUsageFlags::TRANSFER_SRC;
+        let alpha = [vk::CompositeAlphaFlagsKHR::OPAQUE, vk::CompositeAlphaFlagsKHR::INHERIT];
+        let alpha = alpha.into_iter().find(|a| capabilities.supported_composite_alpha.contains(*a));
+        let old = self.raw;
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(self.surface.raw)
+            .min_image_count((capabilities.min_image_count + 1).min(most))
+            .image_format(self.format.format)
+            .image_color_space(self.format.color_space)
+            .image_extent(vk::Extent2D { width, height })
+            .image_array_layers(1)
+            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | (capabilities.supported_usage_flags & copy))
+            .pre_transform(capabilities.current_transform)
+            .composite_alpha(alpha.unwrap_or(vk::CompositeAlphaFlagsKHR::POST_MULTIPLIED))
+            .present_mode(self.mode()?)
+            .clipped(true)
+            .old_swapchain(old);
+        self.destroy_images();
+        // SAFETY: the device is idle, the old swapchain is retired by this call and then destroyed.
+        unsafe {
+            let made = self.loader.create_swapchain(&info, None);
+            self.raw = *made.as_ref().unwrap_or(&vk::SwapchainKHR::null());
+            self.loader.destroy_swapchain(old, None);
+            made.context("images for the window")?;
+        }
+        self.gpu.name(self.raw, "window");
+        self.can_copy = capabilities.supported_usage_flags.contains(copy);
+        self.size = [width, height];
+        // SAFETY: the swapchain was just made.
+        for image in unsafe { self.loader.get_swapchain_images(self.raw) }? {
+            self.images.push(Shown::new(&self.gpu, image, self.format.format)?);
+        }
+        self.depth = Some(depth_image(&self.gpu, self.size)?);
+        Ok(())
+    }
+
+    /// First in, first out unless there is a faster way and it is wanted: that one is always there.
+    fn mode(&self) -> Result<vk::PresentModeKHR> {
+        if self.vsync {
+            return Ok(vk::PresentModeKHR::FIFO);
+        }
+        let device = self.gpu.candidate.raw;
+        // SAFETY: device and surface are of the same instance.
+        let modes = unsafe { self.surface.loader.get_physical_device_surface_present_modes(device, self.surface.raw) }?;
+        let fast = [vk::PresentModeKHR::MAILBOX, vk::PresentModeKHR::IMMEDIATE];
+        Ok(fast.into_iter().find(|mode| modes.contains(mode)).unwrap_or(vk::PresentModeKHR::FIFO))
+    }
+
+    /// An image for the frame in this slot, which must have been waited for; `None` if there is none now: the
+    /// next [`Swapchain::fit`] sees to it.
+    pub fn acquire(&mut self, slot: usize) -> Result<Option<Acquired>> {
+        const PATIENCE_NS: u64 = 1_000_000_000;
+        let wait = self.acquired[slot];
+        // SAFETY: the slot's last frame has ended, so nothing waits for or signals the semaphore.
+        let acquired = unsafe { self.loader.acquire_next_image(self.raw, PATIENCE_NS, wait, vk::Fence::null()) };
+        let index = match acquired {
+            Ok((index, suboptimal)) => {
+                self.note(suboptimal);
+                index
+            }
+            // A window that no one sees may not give its images back.
+            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
+            Err(error) => return self.excuse(error, "acquiring an image of the window").map(|()| None),
+        };
+        let Shown { image, view, drawn } = self.images[index as usize];
+        let attachment = Attachment { image, view, format: self.format.format, size: self.size };
+        Ok(Some(Acquired { attachment, wait, signal: drawn, index }))
+    }
+
+    /// The depth image that goes with the images.
+    ///
+    /// # Panics
+    /// If [`Swapchain::fit`] never succeeded.
+    pub fn depth(&self) -> &Image {
+        self.depth.as_ref().expect("made with the images")
+    }
+
+    /// Room for a copy of one frame: made before the frame begins.
+    pub fn screenshot(&self) -> Result<Screenshot> {
+        if !self.can_copy {
+            bail!("this window's pictures cannot be copied");
+        }
+        Screenshot::new(&self.gpu, self.format.format, self.size)
+    }
+
+    /// Records the image's way to the screen, and its copy if wanted: after [`super::target::end`].
+    pub fn finish(&self, recording: &Recording, acquired: &Acquired, screenshot: Option<&Screenshot>) {
+        use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+        let image = acquired.attachment;
+        let mut last =
+            (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
+        if let Some(screenshot) = screenshot {
+            last = screenshot.record(recording, image, last);
+        }
+        // The semaphore that the presentation waits for makes writes visible to it.
+        let shown = (Stage::NONE, Access::NONE, Layout::PRESENT_SRC_KHR);
+        barriers(&self.gpu, recording.commands, &[image_barrier(image.image, image.format, last, shown)]);
+    }
+
+    /// Shows an image whose frame was submitted.
+    pub fn present(&mut self, acquired: &Acquired) -> Result<()> {
+        let (waits, chains, indices) = ([acquired.signal], [self.raw], [acquired.index]);
+        let info = vk::PresentInfoKHR::default().wait_semaphores(&waits).swapchains(&chains).image_indices(&indices);
+        // SAFETY: the image was acquired, and a submitted frame signals the semaphore.
+        match unsafe { self.loader.queue_present(self.gpu.queue, &info) } {
+            Ok(suboptimal) => {
+                self.note(suboptimal);
+                Ok(())
+            }
+            Err(error) => self.excuse(error, "showing a frame"),
+        }
+    }
+
+    fn note(&mut self, suboptimal: bool) {
+        if suboptimal && self.state == State::Fit {
+            self.state = State::Suboptimal;
+        }
+    }
+
+    /// Takes what is expected of a window as a status.
+    fn excuse(&mut self, error: vk::Result, doing: &'static str) -> Result<()> {
+        match error {
+            vk::Result::ERROR_OUT_OF_DATE_KHR => self.state = State::Stale,
+            vk::Result::ERROR_SURFACE_LOST_KHR => self.state = State::Lost,
+            other => return Err(other).context(doing),
+        }
+        Ok(())
+    }
+
+    fn destroy_images(&mut self) {
+        for shown in self.images.drain(..) {
+            // SAFETY: callers have waited for the device.
+            unsafe {
+                self.gpu.raw.destroy_image_view(shown.view, None);
+                self.gpu.raw.destroy_semaphore(shown.drawn, None);
+            }
+        }
+        self.depth = None;
+    }
+}
+
+impl Shown {
+    fn new(gpu: &Gpu, image: vk::Image, format: vk::Format) -> Result<Self> {
+        let range =
+            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
+        let info = vk::ImageViewCreateInfo::default()
+            .image(image)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(format)
+            .subresource_range(range);
+        // SAFETY: the image is the swapchain's; its owner destroys view and semaphore first.
+        unsafe {
+            let view = gpu.raw.create_image_view(&info, None)?;
+            let drawn = gpu.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None)?;
+            gpu.name(view, "window");
+            gpu.name(drawn, "image drawn");
+            Ok(Self { image, view, drawn })
+        }
+    }
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in use once the device is idle; the surface goes after this.
+        unsafe {
+            let _ = self.gpu.raw.device_wait_idle();
+            self.destroy_images();
+            self.loader.destroy_swapchain(self.raw, None);
+            self.acquired.iter().for_each(|semaphore| self.gpu.raw.destroy_semaphore(*semaphore, None));
+        }
+    }
+}
+
+/// An sRGB format of 8 bits, else what there is.
+fn preferred(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
+    let wanted = [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB, vk::Format::A8B8G8R8_SRGB_PACK32];
+    let srgb = vk::ColorSpaceKHR::SRGB_NONLINEAR;
+    let found = wanted.iter().find_map(|w| formats.iter().find(|f| f.format == *w && f.color_space == srgb));
+    found.or(formats.first()).copied().context("the window has no format")
+}
+
+/// The surface's own size, or where that is left to us, the window's within the limits.
+fn extent(capabilities: &vk::SurfaceCapabilitiesKHR, window: [u32; 2]) -> [u32; 2] {
+    let (own, low, high) = (capabilities.current_extent, capabilities.min_image_extent, capabilities.max_image_extent);
+    if own.width != u32::MAX {
+        return [own.width, own.height];
+    }
+    let within = |value: u32, low: u32, high: u32| if value == 0 { 0 } else { value.max(low).min(high) };
+    [within(window[0], low.width, high.width), within(window[1], low.height, high.height)]
+}

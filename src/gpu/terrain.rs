@@ -26,7 +26,7 @@ pub struct Terrain {
     slots: Vec<Slot>,
     descriptors: vk::DescriptorPool,
     samplers: [vk::Sampler; 3],
-    _images: [Image; 3],
+    images: [Image; 3],
 }
 
 /// Geometry that stays.
@@ -76,16 +76,51 @@ impl Terrain {
             pages::sampler(gpu, Sampling::Clamped)?,
         ];
         let descriptors = descriptor_pool(gpu)?;
-        let layouts = [pipelines.set_layout; SLOTS];
-        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&layouts);
-        // SAFETY: the pool holds as many sets as there are slots.
-        let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
-        let slots = sets.into_iter().map(|set| Slot::new(gpu, set, &limits)).collect::<Result<Vec<_>>>()?;
-        for slot in &slots {
-            slot.describe(gpu, &images, samplers);
-        }
         let resident = Resident::new(gpu, resident)?;
-        Ok(Self { gpu: Arc::clone(gpu), pipelines, limits, resident, slots, descriptors, samplers, _images: images })
+        let mut terrain = Self {
+            gpu: Arc::clone(gpu),
+            pipelines,
+            limits,
+            resident,
+            slots: Vec::new(),
+            descriptors,
+            samplers,
+            images,
+        };
+        terrain.make_slots()?;
+        Ok(terrain)
+    }
+
+    fn make_slots(&mut self) -> Result<()> {
+        let gpu = &self.gpu;
+        let layouts = [self.pipelines.set_layout; SLOTS];
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptors).set_layouts(&layouts);
+        // SAFETY: the pool holds as many sets as there are slots, and they are free.
+        let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
+        self.slots = sets.into_iter().map(|set| Slot::new(gpu, set, &self.limits)).collect::<Result<_>>()?;
+        for slot in &self.slots {
+            slot.describe(gpu, &self.images, self.samplers);
+        }
+        Ok(())
+    }
+
+    /// Gives the scene another look: only pipelines are made anew. The plan must be of the same field on the
+    /// same device, and an overlay is the one that the scene was made with.
+    pub fn replan(&mut self, plan: &ScenePlan, formats: Formats) -> Result<()> {
+        self.gpu.wait_idle()?;
+        self.pipelines = Pipelines::new(&self.gpu, plan, formats)?;
+        Ok(())
+    }
+
+    /// Gives the scene another technique: what comes from the field alone stays.
+    pub fn retarget(&mut self, resident: &Geometry, limits: Limits) -> Result<()> {
+        self.gpu.wait_idle()?;
+        self.slots.clear();
+        // SAFETY: the device is idle and the slots that used the sets are gone.
+        unsafe { self.gpu.raw.reset_descriptor_pool(self.descriptors, vk::DescriptorPoolResetFlags::empty())? };
+        self.resident = Resident::new(&self.gpu, resident)?;
+        self.limits = limits;
+        self.make_slots()
     }
 
     /// Writes a frame's data and records its uploads: before the target begins.

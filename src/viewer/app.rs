@@ -1,0 +1,290 @@
+//! The window's events, and the loop that draws frames.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use glam::{DVec2, DVec3};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, KeyEvent, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::window::{Window, WindowId};
+
+use super::bindings::{self, Action, Binding, Trigger};
+use super::camera::Motion;
+use super::hud::{self, Content};
+use super::session::{Request, Session, free_path};
+use super::stage::{Shot, Shown, Stage};
+use super::times::Times;
+use super::{Setup, Summary};
+use crate::gpu::instance::Messages;
+use crate::gpu::{Instance, swapchain};
+use crate::view::Lens;
+
+/// How long to sleep while there is nothing to draw to.
+const REST: Duration = Duration::from_millis(20);
+
+/// Asks the loop to end.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop;
+
+/// The program while its window is open.
+pub struct App<'a> {
+    setup: &'a Setup,
+    bindings: Vec<Binding>,
+    session: Session,
+    open: Option<Open>,
+    input: Input,
+    times: Times,
+    started: Instant,
+    last_frame: Option<Instant>,
+    device: String,
+    messages: Messages,
+    failure: Option<anyhow::Error>,
+}
+
+/// The window and what draws in it. The stage goes first.
+struct Open {
+    stage: Stage,
+    context: egui::Context,
+    window: Arc<Window>,
+    is_occluded: bool,
+}
+
+/// What is held down, and what came in since the last frame.
+#[derive(Default)]
+struct Input {
+    held: Vec<Action>,
+    is_dragging: bool,
+    pointer: Option<DVec2>,
+    dragged_px: DVec2,
+    wheel: f64,
+}
+
+impl<'a> App<'a> {
+    /// Nothing is open yet.
+    pub fn new(setup: &'a Setup) -> Self {
+        Self {
+            setup,
+            bindings: bindings::table(),
+            session: Session::new(setup),
+            open: None,
+            input: Input::default(),
+            times: Times::default(),
+            started: Instant::now(),
+            last_frame: None,
+            device: String::new(),
+            messages: Messages::default(),
+            failure: None,
+        }
+    }
+
+    /// How it went, once the loop has ended.
+    pub fn into_summary(mut self) -> Result<Summary> {
+        let seconds = self.started.elapsed().as_secs_f64();
+        // Device and instance go before the messages are read: they may have a last word.
+        self.open = None;
+        if let Some(failure) = self.failure {
+            return Err(failure);
+        }
+        let messages = self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let (frames, frame_ms) = (self.times.count(), self.times.percentiles());
+        Ok(Summary { device: self.device, frames, seconds, frame_ms, messages })
+    }
+
+    fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
+        let [width, height] = self.setup.view.size;
+        let attributes = Window::default_attributes()
+            .with_title(self.session.title(self.setup))
+            .with_inner_size(PhysicalSize::new(width, height));
+        let window = Arc::new(event_loop.create_window(attributes).context("no window")?);
+        let instance = Instance::new(&swapchain::extensions(event_loop)?, self.setup.validate)?;
+        self.messages = Arc::clone(&instance.messages);
+        let shared: Arc<dyn swapchain::Window> = Arc::clone(&window) as _;
+        let stage = Stage::new(self.setup, &instance, shared)?;
+        self.device = stage.device().to_string();
+        self.open = Some(Open { stage, context: egui::Context::default(), window, is_occluded: false });
+        self.started = Instant::now();
+        Ok(())
+    }
+
+    /// Moves the camera and draws a frame.
+    fn frame(&mut self) -> Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let size = open.window.inner_size();
+        let fit = if open.is_occluded { None } else { open.stage.fit([size.width, size.height])? };
+        let Some(size) = fit else {
+            self.last_frame = None;
+            std::thread::sleep(REST);
+            return Ok(());
+        };
+        let now = Instant::now();
+        let dt = self.last_frame.replace(now).map(|last| (now - last).as_secs_f64());
+        let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
+        self.session.advance(self.setup, &motion, &open.stage.figures, dt.unwrap_or(0.0));
+        let view = self.session.view(self.setup, size);
+        let content = Content {
+            rows: self.session.rows(self.setup, &open.stage.figures),
+            help: self.session.helps.then_some(self.bindings.as_slice()),
+            // A screenshot does not tell of the one before.
+            note: self.session.note().filter(|_| !self.session.wants_copy),
+        };
+        let overlay = hud::paint(&open.context, size, open.window.scale_factor() as f32, &content);
+        let Session { look, frozen, wants_copy, .. } = self.session;
+        let shot = Shot { view: &view, look: &look, frozen, overlay, wants_copy };
+        if let Some(shown) = open.stage.show(self.setup, shot)? {
+            if let Some(dt) = dt {
+                self.times.add(dt * 1e3);
+            }
+            self.keep(shown);
+        }
+        Ok(())
+    }
+
+    /// Writes the copy of a frame, if one was wanted.
+    fn keep(&mut self, shown: Shown) {
+        if !std::mem::take(&mut self.session.wants_copy) {
+            return;
+        }
+        let path = free_path();
+        let note = match shown.copy.map(|picture| (self.setup.save)(&path, &picture)) {
+            Some(Ok(())) => format!("saved {}", path.display()),
+            Some(Err(error)) => format!("not saved: {error:#}"),
+            None => "this window's pictures cannot be copied".to_string(),
+        };
+        self.session.tell(note);
+        self.last_frame = None;
+    }
+
+    fn perform(&mut self, event_loop: &ActiveEventLoop, action: Action) -> Result<()> {
+        let request = self.session.perform(self.setup, action);
+        let Some(open) = &mut self.open else { return Ok(()) };
+        match request {
+            Request::Nothing => return Ok(()),
+            Request::Quit => event_loop.exit(),
+            Request::Look => open.stage.set_look(self.setup, &self.session.look)?,
+            Request::Technique => {
+                let (entry, settings) = &self.session.technique;
+                open.window.set_title(&format!("cuesta: preparing {}", entry.name));
+                open.stage.set_technique(self.setup, entry, settings)?;
+                open.window.set_title(&self.session.title(self.setup));
+            }
+        }
+        // What took long was no frame.
+        self.last_frame = None;
+        Ok(())
+    }
+
+    fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent) -> Result<()> {
+        let Some(action) = bindings::of_key(&self.bindings, event) else { return Ok(()) };
+        self.input.held.retain(|held| *held != action);
+        if event.state == ElementState::Released {
+            return Ok(());
+        }
+        match action {
+            Action::Move(_) | Action::Fast => self.input.held.push(action),
+            Action::Tolerance(_) => return self.perform(event_loop, action),
+            _ if !event.repeat => return self.perform(event_loop, action),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) -> Result<()> {
+        match event {
+            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::RedrawRequested => return self.frame(),
+            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => return self.key(event_loop, &event),
+            WindowEvent::Focused(false) => self.input = Input::default(),
+            WindowEvent::Occluded(is_occluded) => {
+                if let Some(open) = &mut self.open {
+                    open.is_occluded = is_occluded;
+                }
+            }
+            WindowEvent::MouseInput { state, .. } => {
+                let looks = bindings::of(&self.bindings, Trigger::Drag) == Some(Action::Look);
+                self.input.is_dragging = looks && state == ElementState::Pressed;
+            }
+            WindowEvent::CursorMoved { position, .. } => self.input.point(DVec2::new(position.x, position.y)),
+            WindowEvent::MouseWheel { delta, .. } if bindings::of(&self.bindings, Trigger::Wheel).is_some() => {
+                self.input.wheel += match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
+                    MouseScrollDelta::PixelDelta(pixels) => pixels.y / 40.0,
+                };
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Ends the loop if something failed.
+    fn check(&mut self, event_loop: &ActiveEventLoop, result: Result<()>) {
+        if let Err(error) = result {
+            self.failure.get_or_insert(error);
+            event_loop.exit();
+        }
+    }
+}
+
+impl Input {
+    fn point(&mut self, at: DVec2) {
+        let moved = at - self.pointer.unwrap_or(at);
+        self.pointer = Some(at);
+        if self.is_dragging {
+            self.dragged_px += moved;
+        }
+    }
+
+    /// What is wanted in this frame; takes what has come in.
+    fn motion(&mut self, degrees_per_px: f64) -> Motion {
+        let drive: DVec3 = self.held.iter().map(|a| if let Action::Move(axis) = a { *axis } else { DVec3::ZERO }).sum();
+        Motion {
+            drive: drive.clamp(DVec3::NEG_ONE, DVec3::ONE),
+            fast: self.held.contains(&Action::Fast),
+            turn: std::mem::take(&mut self.dragged_px) * degrees_per_px,
+            wheel: std::mem::take(&mut self.wheel),
+        }
+    }
+}
+
+/// The turn that carries the view across the window.
+fn degrees_across(lens: Lens) -> f64 {
+    match lens {
+        Lens::Perspective { fov_x } => fov_x.to_degrees(),
+        Lens::Orthographic { .. } => 90.0,
+    }
+}
+
+impl ApplicationHandler<Stop> for App<'_> {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        event_loop.set_control_flow(ControlFlow::Poll);
+        if self.open.is_none() {
+            let opened = self.open(event_loop);
+            self.check(event_loop, opened);
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let handled = self.handle(event_loop, event);
+        self.check(event_loop, handled);
+    }
+
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, _: Stop) {
+        event_loop.exit();
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if self.setup.seconds.is_some_and(|seconds| self.started.elapsed().as_secs_f64() >= seconds) {
+            event_loop.exit();
+        }
+        if let Some(open) = &self.open {
+            open.window.request_redraw();
+        }
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        // While the window system is still there.
+        self.open = None;
+    }
+}

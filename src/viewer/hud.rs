@@ -1,0 +1,112 @@
+//! The numbers over the picture, the help, and short notes: laid out by egui, drawn by [`crate::gpu::hud`].
+//!
+//! It takes no input. Every character it may show is laid out in every frame, so that the font's texture is
+//! whole from the start and never grows while frames are under way.
+
+use egui::epaint::ClippedPrimitive;
+use egui::{Align2, Color32, Context, FontId, LayerId, Painter, Pos2, RawInput, Rect, TexturesDelta, Vec2, ViewportId};
+
+use super::bindings::Binding;
+
+const TEXT: Color32 = Color32::from_rgb(240, 240, 235);
+const FAINT: Color32 = Color32::from_rgb(180, 192, 204);
+const TITLE: Color32 = Color32::from_rgb(255, 214, 130);
+const SIZE: f32 = 13.0;
+const MARGIN: f32 = 8.0;
+
+/// A name and its value.
+pub type Row = (String, String);
+
+/// What is shown.
+#[derive(Default)]
+pub struct Content<'a> {
+    /// The numbers.
+    pub rows: Vec<Row>,
+    /// The table of keys, if help is wanted.
+    pub help: Option<&'a [Binding]>,
+    /// A note.
+    pub note: Option<&'a str>,
+}
+
+/// The overlay of one frame.
+pub struct Painted {
+    /// Changed textures.
+    pub textures: TexturesDelta,
+    /// What to draw.
+    pub primitives: Vec<ClippedPrimitive>,
+    /// Pixels a point.
+    pub pixels_per_point: f32,
+}
+
+/// Lays the content out for a window of this size in pixels.
+pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -> Painted {
+    let scale = if scale.is_finite() { scale.clamp(0.5, 8.0) } else { 1.0 };
+    let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / scale);
+    let mut input = RawInput { screen_rect: Some(screen), ..Default::default() };
+    input.viewports.entry(ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
+    context.begin_pass(input);
+    let painter = context.layer_painter(LayerId::background());
+    let every: String = (' '..='~').collect();
+    let _ = painter.layout_no_wrap(every, font(SIZE), TEXT);
+    let inner = screen.shrink(MARGIN);
+    if !content.rows.is_empty() {
+        table(&painter, (inner.min, Align2::LEFT_TOP), None, &content.rows, fitting(&painter, inner, &content.rows));
+    }
+    if let Some(bindings) = content.help {
+        let rows: Vec<Row> = bindings.iter().map(|row| (row.keys(), row.about.clone())).collect();
+        let size = fitting(&painter, inner.shrink(SIZE * 1.5), &rows);
+        table(&painter, (screen.center(), Align2::CENTER_CENTER), Some("Keys"), &rows, size);
+    }
+    if let Some(note) = content.note {
+        let rows = [(note.to_string(), String::new())];
+        let at = (inner.center_bottom(), Align2::CENTER_BOTTOM);
+        table(&painter, at, None, &rows, fitting(&painter, inner, &rows));
+    }
+    let output = context.end_pass();
+    let pixels_per_point = output.pixels_per_point;
+    Painted {
+        textures: output.textures_delta,
+        primitives: context.tessellate(output.shapes, pixels_per_point),
+        pixels_per_point,
+    }
+}
+
+fn font(size: f32) -> FontId {
+    FontId::monospace(size)
+}
+
+fn joined(rows: &[Row], part: impl Fn(&Row) -> &str) -> String {
+    rows.iter().map(part).collect::<Vec<_>>().join("\n")
+}
+
+/// The size of type at which a table fits the space: the usual one if there is room.
+fn fitting(painter: &Painter, space: Rect, rows: &[Row]) -> f32 {
+    let line: Vec<_> = rows.iter().map(|(a, b)| a.len().max(b.len())).collect();
+    let (names, values) = (rows.iter().map(|r| r.0.len()).max(), rows.iter().map(|r| r.1.len()).max());
+    let sample = painter.layout_no_wrap("0".to_string(), font(SIZE), TEXT).size();
+    let columns = (names.unwrap_or(0) + values.unwrap_or(0)) as f32 * sample.x + 5.0 * MARGIN;
+    let height = line.len() as f32 * sample.y + 2.0 * MARGIN;
+    let room = (space.width() / columns).min(space.height() / height).min(1.0);
+    // Half-point steps: fewer sizes of the font.
+    (SIZE * room * 2.0).floor().max(8.0) / 2.0
+}
+
+/// Two columns on a dark plate.
+fn table(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, rows: &[Row], size: f32) {
+    let names = painter.layout_no_wrap(joined(rows, |row| &row.0), font(size), FAINT);
+    let values = painter.layout_no_wrap(joined(rows, |row| &row.1), font(size), TEXT);
+    let title = title.map(|text| painter.layout_no_wrap(text.to_string(), font(size), TITLE));
+    let head = title.as_ref().map_or(0.0, |galley| galley.size().y * 1.4);
+    let gap = if values.size().x > 0.0 { MARGIN * 2.0 } else { 0.0 };
+    let inner = Vec2::new(names.size().x + gap + values.size().x, head + names.size().y);
+    let plate = align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN));
+    painter.rect_filled(plate, 4.0, Color32::from_black_alpha(232));
+    let corner = plate.min + Vec2::splat(MARGIN);
+    if let Some(galley) = title {
+        painter.galley(corner, galley, TITLE);
+    }
+    let aside = Vec2::new(names.size().x + gap, 0.0);
+    let below = corner + Vec2::new(0.0, head);
+    painter.galley(below, names, FAINT);
+    painter.galley(below + aside, values, TEXT);
+}

@@ -1,0 +1,255 @@
+//! What the user has chosen so far: camera, look, technique, tolerance; and what each action does to it.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use super::Setup;
+use super::bindings::Action;
+use super::camera::{Camera, Motion};
+use super::hud::Row;
+use super::stage::Figures;
+use super::times::Smoothed;
+use crate::lod::{Entry, Settings, TECHNIQUES};
+use crate::plan::{Colour, Look};
+use crate::view::{Metric, Tolerance, View};
+
+/// How long a note stays.
+const NOTE: Duration = Duration::from_secs(4);
+
+/// The state of the window.
+pub struct Session {
+    /// The camera.
+    pub camera: Camera,
+    /// How the land looks.
+    pub look: Look,
+    /// The technique.
+    pub technique: (&'static Entry, Settings),
+    /// Whether the selection stays as it is.
+    pub frozen: bool,
+    /// Whether the help is shown.
+    pub helps: bool,
+    /// Whether the next frame is copied to a file.
+    pub wants_copy: bool,
+    shows_numbers: bool,
+    tolerance: Tolerance,
+    /// The colours that level colours go back to.
+    plain: Colour,
+    note: Option<(String, Instant)>,
+    frame: Smoothed,
+    select: Smoothed,
+    gpu: Smoothed,
+}
+
+/// What an action asks of the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Nothing.
+    Nothing,
+    /// Pipelines for the new look.
+    Look,
+    /// The new technique's geometry.
+    Technique,
+    /// The end.
+    Quit,
+}
+
+impl Session {
+    /// As it is at the start.
+    pub fn new(setup: &Setup) -> Self {
+        Self {
+            camera: Camera::of(&setup.view),
+            look: setup.look,
+            technique: setup.technique.clone(),
+            frozen: false,
+            helps: false,
+            wants_copy: false,
+            shows_numbers: true,
+            tolerance: setup.view.tolerance,
+            plain: if setup.look.colour == Colour::Level { Colour::Height } else { setup.look.colour },
+            note: None,
+            frame: Smoothed::default(),
+            select: Smoothed::default(),
+            gpu: Smoothed::default(),
+        }
+    }
+
+    /// Does what is done at once; movement is for [`Camera::advance`].
+    pub fn perform(&mut self, setup: &Setup, action: Action) -> Request {
+        match action {
+            Action::Move(_) | Action::Fast | Action::Look | Action::Speed => {}
+            Action::Camera => self.camera.next_mode(&setup.field),
+            Action::Home => self.camera = Camera::of(&setup.view),
+            Action::Technique(k) => return self.take(setup, &TECHNIQUES[k], None),
+            Action::Variant => {
+                let (entry, settings) = &self.technique;
+                let names: Vec<_> = std::iter::once(None).chain(entry.variants.iter().map(|v| Some(v.name))).collect();
+                let current = names.iter().position(|name| *name == settings.variant()).unwrap_or(0);
+                return self.take(setup, entry, names[(current + 1) % names.len()]);
+            }
+            Action::Tolerance(factor) => self.tolerance.px = (self.tolerance.px * factor).clamp(1.0 / 64.0, 256.0),
+            Action::Wireframe => {
+                self.look.wireframe = !self.look.wireframe;
+                return Request::Look;
+            }
+            Action::LevelColours => {
+                let is_level = self.look.colour == Colour::Level;
+                self.look.colour = if is_level { self.plain } else { Colour::Level };
+                return Request::Look;
+            }
+            Action::Colour => {
+                self.look.colour = next_colour(self.look.colour, setup.overlay.is_some());
+                self.plain = if self.look.colour == Colour::Level { self.plain } else { self.look.colour };
+                return Request::Look;
+            }
+            Action::Freeze => self.frozen = !self.frozen,
+            Action::Screenshot => self.wants_copy = true,
+            Action::Hud => self.shows_numbers = !self.shows_numbers,
+            Action::Help => self.helps = !self.helps,
+            Action::Quit => return Request::Quit,
+        }
+        Request::Nothing
+    }
+
+    fn take(&mut self, setup: &Setup, entry: &'static Entry, variant: Option<&str>) -> Request {
+        // What was set on the command line was set on its technique.
+        let is_own = entry.name == setup.technique.0.name;
+        let choices = if is_own { setup.choices.as_slice() } else { &[] };
+        let settings = Settings::new(entry, variant, choices).unwrap_or_else(|_| Settings::defaults(entry));
+        self.technique = (entry, settings);
+        self.frozen = false;
+        Request::Technique
+    }
+
+    /// Moves the camera, and takes the last frame's figures. After a break `dt` is 0: there was no frame.
+    pub fn advance(&mut self, setup: &Setup, motion: &Motion, figures: &Figures, dt: f64) {
+        self.camera.advance(&setup.field, motion, dt);
+        if dt == 0.0 {
+            return;
+        }
+        self.frame.add(dt * 1e3, dt);
+        self.select.add(figures.select_ms, dt);
+        self.gpu.add(figures.gpu_ms, dt);
+    }
+
+    /// The view of a frame.
+    pub fn view(&self, setup: &Setup, size: [u32; 2]) -> View {
+        let above = self.camera.above_ground(&setup.field);
+        View {
+            eye: self.camera.eye,
+            world_from_eye: self.camera.world_from_eye(),
+            size,
+            near: setup.near.unwrap_or((above.abs() / 1000.0).max(0.1)),
+            tolerance: self.tolerance,
+            ..setup.view
+        }
+    }
+
+    /// The technique as it is written on the command line.
+    pub fn technique_name(&self) -> String {
+        let (entry, settings) = &self.technique;
+        settings.variant().map_or(entry.name.to_string(), |variant| format!("{}:{variant}", entry.name))
+    }
+
+    /// The window's title.
+    pub fn title(&self, setup: &Setup) -> String {
+        format!("cuesta: {}, {}", setup.name, self.technique_name())
+    }
+
+    /// Shows a note for a while.
+    pub fn tell(&mut self, text: String) {
+        self.note = Some((text, Instant::now()));
+    }
+
+    /// The note, while it stays.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_ref().filter(|(_, since)| since.elapsed() < NOTE).map(|(text, _)| text.as_str())
+    }
+
+    /// The numbers over the picture.
+    pub fn rows(&self, setup: &Setup, figures: &Figures) -> Vec<Row> {
+        if !self.shows_numbers {
+            return Vec::new();
+        }
+        let row = |name: &str, value: String| (name.to_string(), value);
+        let frame = self.frame.get();
+        let rate = if frame > 0.0 { 1e3 / frame } else { 0.0 };
+        let [x, y, z] = self.camera.eye.to_array();
+        let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
+        let frozen = if self.frozen { ", frozen" } else { "" };
+        let wire = if self.look.wireframe { ", edges" } else { "" };
+        vec![
+            row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
+            row("select", format!("{:.2} ms", self.select.get())),
+            row("gpu", format!("{:.1} ms", self.gpu.get())),
+            row("triangles", grouped(figures.triangles)),
+            row("draws", grouped(figures.draws as u64)),
+            row("technique", format!("{}{frozen}", self.technique_name())),
+            row("tolerance", format!("{:.2} px {metric}", self.tolerance.px)),
+            row("colours", format!("{}{wire}", colour_name(self.look.colour))),
+            row("camera", format!("{}, {}", self.camera.mode_name(), speed_text(self.camera.speed(&setup.field)))),
+            row("position", format!("{x:.0} {y:.0} {z:.0} m")),
+            row("above ground", format!("{:.1} m", self.camera.above_ground(&setup.field))),
+        ]
+    }
+}
+
+/// Where the next screenshot goes: the first free number in the current folder.
+pub fn free_path() -> PathBuf {
+    let path = |k: u32| PathBuf::from(format!("cuesta-{k:03}.png"));
+    path((1..).find(|k| !path(*k).exists()).unwrap_or(0))
+}
+
+fn next_colour(colour: Colour, has_overlay: bool) -> Colour {
+    match colour {
+        Colour::Height if has_overlay => Colour::Overlay,
+        Colour::Height | Colour::Overlay => Colour::Level,
+        Colour::Level => Colour::Error,
+        Colour::Error => Colour::Normal,
+        Colour::Normal => Colour::Batch,
+        Colour::Batch => Colour::Height,
+    }
+}
+
+fn colour_name(colour: Colour) -> &'static str {
+    match colour {
+        Colour::Height => "height",
+        Colour::Overlay => "overlay",
+        Colour::Level => "level",
+        Colour::Error => "error",
+        Colour::Normal => "normal",
+        Colour::Batch => "batch",
+    }
+}
+
+fn speed_text(speed: f64) -> String {
+    if speed < 10.0 { format!("{speed:.1} m/s") } else { format!("{speed:.0} m/s") }
+}
+
+/// Digits in threes.
+fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let groups = digits.as_bytes().rchunks(3).rev().map(|g| String::from_utf8_lossy(g).into_owned());
+    groups.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_come_round() {
+        for has_overlay in [false, true] {
+            let mut seen = vec![Colour::Height];
+            while seen.len() < 10 && (seen.len() == 1 || seen.last() != Some(&Colour::Height)) {
+                seen.push(next_colour(seen[seen.len() - 1], has_overlay));
+            }
+            assert_eq!(seen.len(), 6 + usize::from(has_overlay));
+            assert_eq!(seen.contains(&Colour::Overlay), has_overlay);
+        }
+    }
+
+    #[test]
+    fn digits_in_threes() {
+        assert_eq!([0, 999, 1000, 12_345_678].map(grouped), ["0", "999", "1 000", "12 345 678"]);
+    }
+}

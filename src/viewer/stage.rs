@@ -1,0 +1,156 @@
+//! Everything of one window on the device, and how a frame is made of it.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Result;
+
+use super::Setup;
+use super::hud::Painted;
+use crate::draw::DrawList;
+use crate::gpu::frames::Frames;
+use crate::gpu::hud::Hud;
+use crate::gpu::swapchain::{Surface, Swapchain, Window};
+use crate::gpu::terrain::Terrain;
+use crate::gpu::{Gpu, Instance, target};
+use crate::lod::{Entry, Settings, Technique};
+use crate::plan::{Look, ScenePlan};
+use crate::view::View;
+
+/// Device, window target, terrain and technique.
+pub struct Stage {
+    terrain: Terrain,
+    hud: Hud,
+    frames: Frames,
+    swapchain: Swapchain,
+    gpu: Arc<Gpu>,
+    technique: Box<dyn Technique>,
+    list: DrawList,
+    range: [f32; 2],
+    /// What the last frame took and held.
+    pub figures: Figures,
+}
+
+/// Figures of one frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Figures {
+    /// Selection, milliseconds.
+    pub select_ms: f64,
+    /// Recording, milliseconds.
+    pub record_ms: f64,
+    /// The device, milliseconds; of a frame before.
+    pub gpu_ms: f64,
+    /// Triangles.
+    pub triangles: u64,
+    /// Draws.
+    pub draws: usize,
+}
+
+/// What a frame shows.
+pub struct Shot<'a> {
+    /// From where.
+    pub view: &'a View,
+    /// How.
+    pub look: &'a Look,
+    /// Whether the last selection stays.
+    pub frozen: bool,
+    /// What lies over it.
+    pub overlay: Painted,
+    /// Whether a copy is wanted.
+    pub wants_copy: bool,
+}
+
+/// A frame that was shown.
+pub struct Shown {
+    /// Its copy, if one was wanted and the window's pictures can be copied.
+    pub copy: Option<image::RgbaImage>,
+}
+
+impl Stage {
+    /// Makes everything for a window.
+    pub fn new(setup: &Setup, instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
+        let surface = Surface::new(instance, window)?;
+        let gpu = Gpu::for_window(instance, &setup.choice, |candidate| surface.is_shown_by(candidate))?;
+        let swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
+        let formats = swapchain.formats();
+        let plan = ScenePlan::new(&setup.field, &setup.look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        let (entry, settings) = &setup.technique;
+        let technique = (entry.build)(Arc::clone(&setup.field), settings);
+        let (resident, limits) = (technique.resident(), technique.limits());
+        let statistics = setup.field.statistics();
+        Ok(Self {
+            terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), resident, limits, formats)?,
+            hud: Hud::new(&gpu, formats)?,
+            frames: Frames::new(&gpu, plan.measured)?,
+            swapchain,
+            technique,
+            list: DrawList::default(),
+            range: [statistics.min, statistics.max],
+            figures: Figures::default(),
+            gpu,
+        })
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        &self.gpu.candidate.name
+    }
+
+    /// Changes the look: pipelines only.
+    pub fn set_look(&mut self, setup: &Setup, look: &Look) -> Result<()> {
+        let plan = ScenePlan::new(&setup.field, look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        self.terrain.replan(&plan, self.swapchain.formats())
+    }
+
+    /// Changes the technique: its geometry and the slots' room.
+    pub fn set_technique(&mut self, setup: &Setup, entry: &Entry, settings: &Settings) -> Result<()> {
+        self.technique = (entry.build)(Arc::clone(&setup.field), settings);
+        self.list.clear();
+        self.terrain.retarget(self.technique.resident(), self.technique.limits())
+    }
+
+    /// The size of the next frame in a window of this size; `None` while it is minimised.
+    pub fn fit(&mut self, window: [u32; 2]) -> Result<Option<[u32; 2]>> {
+        self.swapchain.fit(window)
+    }
+
+    /// Draws and shows a frame. `None`: the window could not take it, and the frame was dropped before anything
+    /// was selected.
+    pub fn show(&mut self, setup: &Setup, mut shot: Shot) -> Result<Option<Shown>> {
+        self.hud.update(std::mem::take(&mut shot.overlay.textures))?;
+        let copy = if shot.wants_copy { self.swapchain.screenshot().ok() } else { None };
+        let mut recording = self.frames.begin()?;
+        let Some(image) = self.swapchain.acquire(recording.slot)? else { return Ok(None) };
+        let started = Instant::now();
+        if shot.frozen {
+            // They were made when the list was drawn first.
+            self.list.uploads.clear();
+        } else {
+            self.list.clear();
+            self.technique.select(shot.view, &mut self.list);
+        }
+        self.figures.select_ms = ms(started);
+        let started = Instant::now();
+        let frame = shot.look.frame(&setup.field, shot.view, self.range);
+        self.terrain.prepare(&mut recording, &frame, &self.list)?;
+        target::begin(&recording, image.attachment, self.swapchain.depth());
+        self.terrain.draw(&mut recording, &self.list)?;
+        let Painted { primitives, pixels_per_point, .. } = &mut shot.overlay;
+        self.hud.draw(&mut recording, shot.view.size, *pixels_per_point, primitives)?;
+        target::end(&recording);
+        self.swapchain.finish(&recording, &image, copy.as_ref());
+        self.figures.record_ms = ms(started);
+        self.frames.submit(Some(image.wait), Some(image.signal))?;
+        self.swapchain.present(&image)?;
+        self.figures.gpu_ms = self.frames.timing.total_ms;
+        (self.figures.triangles, self.figures.draws) = (self.list.triangles(), self.list.draws.len());
+        if copy.is_some() {
+            self.frames.finish()?;
+        }
+        Ok(Some(Shown { copy: copy.map(|copy| copy.picture()) }))
+    }
+}
+
+fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,257 @@
+//! The window, driven as a person drives it: real key and mouse events on a virtual display, and pictures of
+//! what they led to. Without Xvfb and xdotool the test says so and passes, unless REQUIRE_GPU=1.
+
+mod display;
+
+use std::cell::Cell;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use display::{Display, eventually, picture};
+use image::RgbImage;
+
+/// The program on a display.
+struct Viewer<'a> {
+    display: &'a Display,
+    program: Option<Child>,
+    window: String,
+    folder: tempfile::TempDir,
+    pictures: Cell<u32>,
+}
+
+impl<'a> Viewer<'a> {
+    fn open(display: &'a Display) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+        command.args(["view", "demo", "--size", "320x240", "--tolerance", "2", "--validate", "--json"]);
+        // Should a key be lost, it still ends.
+        command.args(["--seconds", "300"]).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let program = display.on(&mut command).spawn().expect("the program starts");
+        let viewer =
+            Self { display, program: Some(program), window: display.window("cuesta"), folder, pictures: Cell::new(0) };
+        viewer.focus();
+        viewer
+    }
+
+    fn focus(&self) {
+        self.display.act(&format!("windowfocus --sync {}", self.window));
+    }
+
+    /// Presses keys one after the other.
+    fn press(&self, keys: &str) {
+        self.display.act(&format!("key {keys}"));
+    }
+
+    fn hold(&self, key: &str, time: Duration) {
+        self.display.act(&format!("keydown {key}"));
+        std::thread::sleep(time);
+        self.display.act(&format!("keyup {key}"));
+    }
+
+    /// The next screenshot: it shows what the keys pressed before led to.
+    fn shoot(&self) -> RgbImage {
+        self.press("p");
+        self.pictures.set(self.pictures.get() + 1);
+        picture(&self.folder.path().join(format!("cuesta-{:03}.png", self.pictures.get())))
+    }
+
+    /// Presses keys and takes the next screenshot.
+    fn after(&self, keys: &str) -> RgbImage {
+        self.press(keys);
+        self.shoot()
+    }
+
+    fn resize(&self, [width, height]: [u32; 2]) {
+        self.display.act(&format!("windowsize --sync {} {width} {height}", self.window));
+    }
+
+    fn quit(mut self) -> Output {
+        self.press("Escape");
+        self.program.take().expect("it runs").wait_with_output().expect("it ends")
+    }
+}
+
+impl Drop for Viewer<'_> {
+    fn drop(&mut self) {
+        if let Some(mut program) = self.program.take() {
+            let _ = program.kill();
+            let _ = program.wait();
+        }
+        if std::thread::panicking() {
+            self.folder.disable_cleanup(true);
+            println!("pictures: {}", self.folder.path().display());
+        }
+    }
+}
+
+/// Share of the pixels that differ by more than noise.
+fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let differs = |(p, q): &(&image::Rgb<u8>, &image::Rgb<u8>)| p.0.iter().zip(q.0).any(|(x, y)| x.abs_diff(y) > 12);
+    a.pixels().zip(b.pixels()).filter(differs).count() as f64 / f64::from(a.width() * a.height())
+}
+
+/// Mean brightness of a part: x, y, width, height as shares of the picture.
+fn brightness(picture: &RgbImage, [x, y, w, h]: [f64; 4]) -> f64 {
+    let (width, height) = (f64::from(picture.width()), f64::from(picture.height()));
+    let at = |share: f64, of: f64| (share * of) as u32;
+    let part = image::imageops::crop_imm(picture, at(x, width), at(y, height), at(w, width), at(h, height)).to_image();
+    let sum: f64 = part.pixels().map(|p| p.0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).sum();
+    sum / f64::from(part.width() * part.height())
+}
+
+fn on_display(test: impl FnOnce(&Display)) {
+    match Display::start() {
+        Ok(display) => test(&display),
+        Err(missing) => {
+            assert!(std::env::var("REQUIRE_GPU").as_deref() != Ok("1"), "{missing}");
+            println!("skipped: {missing}");
+        }
+    }
+}
+
+#[test]
+fn a_session_at_the_window() {
+    on_display(|display| {
+        let viewer = Viewer::open(display);
+        numbers_and_help(&viewer);
+        let start = viewer.shoot();
+        assert!(brightness(&start, [0.6, 0.0, 0.4, 0.1]) > 180.0, "sky above");
+        assert!(brightness(&start, [0.3, 0.4, 0.4, 0.4]) < 150.0, "land below");
+        looks(&viewer, &start);
+        technique_and_tolerance(&viewer, &start);
+        movement(&viewer, &start);
+        sizes(&viewer);
+        end(viewer);
+    });
+}
+
+/// The numbers at the top left, the help in the middle. Leaves both off.
+fn numbers_and_help(viewer: &Viewer) {
+    let plate = [0.03, 0.04, 0.1, 0.1];
+    let with_numbers = viewer.shoot();
+    let with_help = viewer.after("h");
+    let bare = viewer.after("h u");
+    assert!(brightness(&with_numbers, plate) < 120.0, "numbers lie on a dark plate");
+    assert!(brightness(&bare, plate) > 180.0, "behind it is sky");
+    let text = |p: &RgbImage| p.pixels().filter(|p| p.0.iter().all(|&c| c > 190)).count();
+    let corner = |p: &RgbImage| image::imageops::crop_imm(p, 120, 10, 140, 70).to_image();
+    assert!(text(&corner(&with_numbers)) > 50, "with light letters");
+    assert!(brightness(&with_help, [0.4, 0.2, 0.2, 0.6]) < brightness(&bare, [0.4, 0.2, 0.2, 0.6]) - 20.0, "help");
+}
+
+/// Each look differs from the first one as it should, and goes back to it exactly.
+fn looks(viewer: &Viewer, start: &RgbImage) {
+    let level = viewer.after("l");
+    assert!(difference(start, &level) > 0.3, "level colours: {}", difference(start, &level));
+    let wire = viewer.after("l f");
+    assert!(difference(start, &wire) > 0.02, "wireframe: {}", difference(start, &wire));
+    assert_eq!(difference(start, &viewer.after("f")), 0.0, "and back");
+    // Overlay, level, error, normal, batch, height: all there are, and overlay again.
+    let mut seen = vec![start.clone()];
+    for _ in 0..5 {
+        let next = viewer.after("c");
+        assert!(seen.iter().all(|other| difference(other, &next) > 0.1), "colours number {}", seen.len());
+        seen.push(next);
+    }
+    assert_eq!(difference(start, &viewer.after("c")), 0.0, "and round");
+}
+
+/// The window says which technique draws; a wider tolerance is seen in the levels.
+fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
+    let title = || viewer.display.act(&format!("getwindowname {}", viewer.window));
+    for (k, entry) in cuesta::lod::TECHNIQUES.iter().enumerate() {
+        viewer.press(&format!("{}", k + 1));
+        eventually("the title", || (title() == format!("cuesta: demo, {}", entry.name)).then_some(()));
+        let drawn = viewer.shoot();
+        assert!(difference(start, &drawn) < 0.1, "{}: {}", entry.name, difference(start, &drawn));
+    }
+    let geomipmap = cuesta::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
+    let fine = viewer.after(&format!("{} l", geomipmap + 1));
+    let coarse = viewer.after("plus plus plus plus plus plus");
+    assert!(difference(&fine, &coarse) > 0.2, "tolerance: {}", difference(&fine, &coarse));
+    assert_eq!(difference(&fine, &viewer.after("minus minus minus minus minus minus")), 0.0);
+    // Frozen, the levels stay as they were chosen for where the eye was.
+    viewer.press("z");
+    viewer.hold("s", Duration::from_millis(1500));
+    let frozen = viewer.shoot();
+    assert!(difference(&fine, &frozen) > 0.2, "the eye has moved");
+    let followed = viewer.after("z");
+    assert!(difference(&frozen, &followed) > 0.02, "freeze: {}", difference(&frozen, &followed));
+    assert_eq!(difference(start, &viewer.after("l Home")), 0.0, "home again");
+}
+
+/// Keys and mouse move the camera, `Home` brings it back.
+fn movement(viewer: &Viewer, start: &RgbImage) {
+    for camera in ["fly", "orbit", "walk"] {
+        viewer.hold("w", Duration::from_millis(600));
+        let before = viewer.shoot();
+        if camera != "walk" {
+            assert!(difference(start, &before) > 0.1, "{camera}: {}", difference(start, &before));
+        }
+        viewer.display.act("mousemove 160 120 mousedown 1 mousemove_relative 60 15");
+        let turned = viewer.shoot();
+        viewer.display.act("mouseup 1 click 4 click 4 click 5");
+        assert!(difference(&before, &turned) > 0.1, "{camera}, dragged: {}", difference(&before, &turned));
+        viewer.press("Tab");
+    }
+    assert_eq!(difference(start, &viewer.after("Home")), 0.0, "home again");
+}
+
+/// The window is pulled about, hidden and shown; every picture has the window's size.
+fn sizes(viewer: &Viewer) {
+    for size in [[500, 300], [1, 1], [640, 420], [321, 239], [200, 600], [320, 240]] {
+        viewer.resize(size);
+        assert_eq!(
+            eventually("the size", || Some(viewer.shoot()).filter(|p| p.dimensions() == size.into())).dimensions(),
+            size.into()
+        );
+    }
+    for _ in 0..2 {
+        viewer.display.act(&format!("windowunmap --sync {}", viewer.window));
+        std::thread::sleep(Duration::from_millis(300));
+        viewer.display.act(&format!("windowmap --sync {}", viewer.window));
+        viewer.focus();
+        viewer.shoot();
+    }
+}
+
+/// It ends well, and the layers had nothing to say.
+fn end(viewer: Viewer) {
+    let output = viewer.quit();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(summary["validation_messages"], serde_json::json!([]));
+    assert!(summary["frames"].as_u64() > Some(30), "{summary}");
+    assert!(summary["frame_ms"]["p99"].as_f64() >= summary["frame_ms"]["p50"].as_f64(), "{summary}");
+    assert!(!told.contains("validation"), "{told}");
+}
+
+#[test]
+fn it_ends_by_itself() {
+    on_display(|display| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+        command.args(["view", "demo", "--size", "64x48", "--seconds", "1", "--vsync", "off", "--quiet", "--validate"]);
+        let output = display.on(&mut command).output().expect("the program runs");
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stdout.is_empty());
+    });
+}
+
+#[test]
+fn without_a_display_it_says_so_in_one_line() {
+    for display in [None, Some(":987654")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+        command.args(["view", "demo", "--quiet"]).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        match display {
+            Some(name) => command.env("DISPLAY", name),
+            None => command.env_remove("DISPLAY"),
+        };
+        let output = command.current_dir(Path::new("/")).output().expect("the program runs");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.starts_with("error: ") && told.lines().count() == 1 && told.contains("display"), "{told}");
+    }
+}
