@@ -7,6 +7,7 @@ mod conformance;
 mod gpu;
 mod height;
 mod measure;
+mod readme;
 mod synth;
 #[cfg(feature = "viewer")]
 mod viewer;

@@ -1,11 +1,11 @@
 //! `cuesta export`: the as-drawn mesh of one view, in world metres.
 
 use std::collections::HashMap;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
@@ -15,6 +15,7 @@ use super::scene::{TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, report};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
+use crate::height::save::{Out, replace};
 use crate::height::surface::Corner;
 use crate::height::{Error, Field, surface};
 
@@ -49,15 +50,16 @@ struct Mesh {
 
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
-    let write = match args.output.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
-        Some("ply") => write_ply,
-        Some("obj") => write_obj,
-        Some("glb") => write_glb,
-        _ => {
-            let file = args.output.display().to_string();
-            return Err(Error::new(file, "extension", "expected .ply, .obj or .glb").into());
-        }
-    };
+    let write: fn(&Mesh, &mut Out) -> io::Result<()> =
+        match args.output.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+            Some("ply") => write_ply,
+            Some("obj") => write_obj,
+            Some("glb") => write_glb,
+            _ => {
+                let file = args.output.display().to_string();
+                return Err(Error::new(file, "extension", "expected .ply, .obj or .glb").into());
+            }
+        };
     let field = Arc::new(args.terrain.load(common)?.field);
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let mut technique = args.technique.build(common, &field)?;
@@ -67,21 +69,10 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     let frame = Frame::placing(&field, &view);
     expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));
     let mesh = mesh.mesh;
-    save(&args.output, &mesh, write)?;
+    replace(&args.output, |out| write(&mesh, out))
+        .map_err(|e| Error::new(args.output.display().to_string(), "file", e))?;
     report::print(common, &Exported { triangles: mesh.triangles.len(), vertices: mesh.positions.len() })?;
     Ok(Outcome::Done)
-}
-
-/// Writes beside the target and renames, so that a failure leaves no half a file.
-fn save(path: &Path, mesh: &Mesh, write: fn(&Mesh, &mut dyn Write) -> Result<()>) -> Result<()> {
-    let name = path.display().to_string();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::new(&name, "file", e))?;
-    let mut out = BufWriter::new(file);
-    write(mesh, &mut out).with_context(|| name.clone())?;
-    let file = out.into_inner().map_err(|e| Error::new(&name, "file", e.error()))?;
-    file.persist(path).map_err(|e| Error::new(&name, "file", e.error))?;
-    Ok(())
 }
 
 /// Collects triangles and shares their vertices.
@@ -110,7 +101,7 @@ impl<'a> MeshBuilder<'a> {
     }
 }
 
-fn write_ply(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+fn write_ply(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment x east, y up, z south; world metres")?;
     writeln!(out, "element vertex {}", mesh.positions.len())?;
     writeln!(out, "property double x\nproperty double y\nproperty double z")?;
@@ -130,7 +121,7 @@ fn write_ply(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
     Ok(())
 }
 
-fn write_obj(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+fn write_obj(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     writeln!(out, "# x east, y up, z south; world metres")?;
     for p in &mesh.positions {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
@@ -142,7 +133,7 @@ fn write_obj(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
 }
 
 /// glTF holds positions in f32: they are relative to a node whose translation is in f64.
-fn write_glb(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
+fn write_glb(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     let low = mesh.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
     let high = mesh.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
     let relative: Vec<[f32; 3]> = mesh.positions.iter().map(|p| (*p - low).as_vec3().to_array()).collect();
@@ -168,7 +159,7 @@ fn write_glb(mesh: &Mesh, out: &mut dyn Write) -> Result<()> {
     let mut text = serde_json::to_vec(&document)?;
     text.resize(text.len().next_multiple_of(4), b' ');
     let total = 12 + 8 + text.len() + 8 + positions.len() + indices.len();
-    let word = |value: usize| u32::try_from(value).context("a GLB file holds at most 4 GiB");
+    let word = |value: usize| u32::try_from(value).map_err(|_| io::Error::other("a GLB file holds at most 4 GiB"));
     out.write_all(b"glTF")?;
     for value in [2, word(total)?, word(text.len())?] {
         out.write_all(&value.to_le_bytes())?;

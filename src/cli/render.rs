@@ -16,6 +16,7 @@ use crate::gpu::frames::{Frames, Timing};
 use crate::gpu::target::{self, Offscreen};
 use crate::gpu::terrain::Terrain;
 use crate::gpu::{Choice, Gpu, Instance};
+use crate::height::save::replace;
 use crate::height::{Error, Field};
 use crate::lod::{self, Settings, Technique};
 use crate::measure::geometric::{self, Summary};
@@ -170,34 +171,11 @@ fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// Writes a picture's colours beside the target and renames.
+/// Writes a picture's colours, or leaves the file that was there.
 pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
-    let fail = |e: &dyn std::fmt::Display| Error::new(path.display().to_string(), "file", e);
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| fail(&e))?;
     let rgb = image::DynamicImage::from(picture.clone()).into_rgb8();
-    rgb.write_to(&mut std::io::BufWriter::new(SeekFile(file.as_file_mut())), image::ImageFormat::Png)
-        .map_err(|e| fail(&e))?;
-    file.persist(path).map_err(|e| fail(&e.error))?;
-    Ok(())
-}
-
-/// A file as the encoder wants it.
-struct SeekFile<'a>(&'a mut std::fs::File);
-
-impl std::io::Write for SeekFile<'_> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.write(bytes)
-    }
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()
-    }
-}
-
-impl std::io::Seek for SeekFile<'_> {
-    fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {
-        self.0.seek(to)
-    }
+    let written = replace(path, |out| rgb.write_to(out, image::ImageFormat::Png).map_err(std::io::Error::other));
+    Ok(written.map_err(|e| Error::new(path.display().to_string(), "file", e))?)
 }
 
 /// One field with one look on one device.

@@ -10,7 +10,8 @@ use tiff::tags::{Predictor, Tag};
 
 use super::{Error, Field, Samples};
 
-type Out<'a> = BufWriter<&'a File>;
+/// A file while it is written.
+pub type Out<'a> = BufWriter<&'a File>;
 
 /// Writes all samples of `field`, tiling included, in the format of the extension, or leaves what was there.
 ///
@@ -36,7 +37,7 @@ pub fn save(field: &Field, path: &Path) -> Result<(), Error> {
 }
 
 /// Writes a file beside `path` and then gives it that name: readers see the old file or the new one, never a part.
-fn replace(path: &Path, write: impl FnOnce(&mut Out) -> io::Result<()>) -> io::Result<()> {
+pub fn replace(path: &Path, write: impl FnOnce(&mut Out) -> io::Result<()>) -> io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     // A temporary file is the owner's alone; a saved one is everyone's that the umask allows.
