@@ -258,7 +258,7 @@ mod tests {
             let mut camera = camera(30.0, -40.0, 0.0);
             (0..mode).for_each(|_| camera.next_mode(&field));
             for k in 0..20_000usize {
-                let pick = |n: usize| strange[(k * 2654435761 >> n) % strange.len()];
+                let pick = |n: usize| strange[((k * 2654435761) >> n) % strange.len()];
                 let motion = Motion {
                     drive: DVec3::new(pick(1), pick(3), pick(5)),
                     fast: k % 7 == 0,
