@@ -1,6 +1,7 @@
 //! All integration tests in one binary; the modules mirror `src/`.
 
 mod architecture;
+mod cli;
 mod conformance;
 #[cfg(feature = "vulkan")]
 mod gpu;

@@ -41,6 +41,9 @@ pub struct RenderArgs {
     /// The look.
     #[command(flatten)]
     pub look: LookArgs,
+    /// Draw it so often and report the median times.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub repeat: u32,
     /// Measure the error of what was drawn, prove it watertight, count hole pixels.
     #[arg(long)]
     pub measure: bool,
@@ -74,6 +77,8 @@ struct Measured {
     error_px: Statistics,
     error_m: Statistics,
     hole_pixels: usize,
+    /// The first few, from the top left corner.
+    hole_pixels_at: Vec<[usize; 2]>,
     skirt_pixels: usize,
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -122,7 +127,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
-    let shot = scene.shoot(technique.as_mut(), &view)?;
+    let shot = scene.shoot_often(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;
     let measured = if args.measure { Some(scene.measure(technique.as_ref(), &view, &shot)?) } else { None };
     let messages = gpu.messages();
@@ -154,6 +159,11 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     };
     report::print(common, &rendered)?;
     Ok(if missed || !messages.is_empty() { Outcome::LimitMissed } else { Outcome::Done })
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
 fn ms(since: Instant) -> f64 {
@@ -223,10 +233,11 @@ pub struct Shot {
 impl Scene<'_> {
     /// Draws one view offscreen.
     pub fn shoot(&self, technique: &mut dyn Technique, view: &View) -> Result<Shot> {
-        let selected = Instant::now();
-        let mut list = DrawList::default();
-        technique.select(view, &mut list);
-        let select_ms = ms(selected);
+        self.shoot_often(technique, view, 1)
+    }
+
+    /// Draws one view offscreen `times` times; the times are medians.
+    fn shoot_often(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
         let offscreen = Offscreen::new(self.gpu, view.size)?;
         let (resident, limits) = (technique.resident(), technique.limits());
         let mut terrain =
@@ -234,22 +245,32 @@ impl Scene<'_> {
         let statistics = self.field.statistics();
         let frame = self.look.frame(self.field, view, [statistics.min, statistics.max]);
         let mut frames = Frames::new(self.gpu, self.plan.measured)?;
-        let recorded = Instant::now();
-        let mut recording = frames.begin()?;
-        terrain.prepare(&mut recording, &frame, &list)?;
-        target::begin(&recording, offscreen.attachment(), &offscreen.depth);
-        terrain.draw(&mut recording, &list)?;
-        target::end(&recording);
-        offscreen.read_back(&recording);
-        let record_ms = ms(recorded);
-        frames.submit(None, None)?;
-        frames.finish().context("drawing")?;
+        let mut list = DrawList::default();
+        let (mut selects, mut records, mut timings) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..times {
+            let start = Instant::now();
+            list.clear();
+            technique.select(view, &mut list);
+            selects.push(ms(start));
+            let start = Instant::now();
+            let mut recording = frames.begin()?;
+            terrain.prepare(&mut recording, &frame, &list)?;
+            target::begin(&recording, offscreen.attachment(), &offscreen.depth);
+            terrain.draw(&mut recording, &list)?;
+            target::end(&recording);
+            offscreen.read_back(&recording);
+            records.push(ms(start));
+            frames.submit(None, None)?;
+            frames.finish().context("drawing")?;
+            timings.push(frames.timing.clone());
+        }
+        timings.sort_by(|a, b| a.total_ms.total_cmp(&b.total_ms));
         Ok(Shot {
             picture: offscreen.picture(),
             list,
-            timing: frames.timing.clone(),
-            select_ms,
-            record_ms,
+            timing: timings[timings.len() / 2].clone(),
+            select_ms: median(selects),
+            record_ms: median(records),
             device_bytes: self.gpu.device_bytes().values().sum(),
         })
     }
@@ -260,20 +281,46 @@ impl Scene<'_> {
             expand::triangles(self.field, &Frame::placing(self.field, view), technique.resident(), &shot.list);
         let proof = watertight::prove(self.field, &view.frustum(), &triangles);
         drop(triangles);
-        let brute = lod::find("brute-force").expect("in the table");
-        let mut brute = (brute.build)(Arc::clone(self.field), &Settings::defaults(brute));
-        let truth = self.shoot(brute.as_mut(), view)?;
-        let covered = |shot: &Shot| -> Vec<bool> { shot.picture.pixels().map(|p| p.0[3] > 0).collect() };
-        let radius = picture::outline_radius(view.tolerance.px);
-        let holes = picture::hole_pixels(&covered(shot), &covered(&truth), view.size[0] as usize, radius);
+        let holes = self.hole_pixels(view, shot)?;
+        let width = view.size[0] as usize;
         Ok(Measured {
             error_px: errors.screen_px.into(),
             error_m: errors.vertical_m.into(),
             hole_pixels: holes.len(),
+            hole_pixels_at: holes.iter().take(8).map(|k| [k % width, k / width]).collect(),
             // No technique of the table draws skirts.
             skirt_pixels: 0,
             watertight: proof.is_ok(),
             counter_example: proof.err().map(|e| e.to_string()),
         })
     }
+
+    /// Pixels where the sky shines through land. Where samples have no data, land within the tolerance of the
+    /// truth may show what the truth just hides: pixels that missing land projects to do not count.
+    fn hole_pixels(&self, view: &View, shot: &Shot) -> Result<Vec<usize>> {
+        let covered = |shot: &Shot| -> Vec<bool> { shot.picture.pixels().map(|p| p.0[3] > 0).collect() };
+        let (width, radius) = (view.size[0] as usize, picture::outline_radius(view.tolerance.px));
+        let truth = covered(&self.shoot(brute_force(self.field).as_mut(), view)?);
+        let mut holes = picture::hole_pixels(&covered(shot), &truth, width, radius);
+        if self.field.holes().count() > 0 {
+            let missing = Arc::new(self.field.around_holes());
+            let scene = Scene { field: &missing, ..*self };
+            let mut mask = covered(&scene.shoot(brute_force(&missing).as_mut(), view)?);
+            // Holes smaller than a pixel may fall between pixel centres.
+            let [w, h] = missing.stored();
+            for (i, j) in (0..h).flat_map(|j| (0..w).map(move |i| (i, j))).filter(|&(i, j)| !missing.is_hole(i, j)) {
+                let seen = view.project(missing.world(i, j)).filter(|p| view.in_picture(p));
+                let pixel = seen.map(|p| (p.pixel.y as usize * width + p.pixel.x as usize).min(mask.len() - 1));
+                pixel.into_iter().for_each(|k| mask[k] = true);
+            }
+            let missing = picture::widened(&mask, width, radius);
+            holes.retain(|&k| !missing[k]);
+        }
+        Ok(holes)
+    }
+}
+
+fn brute_force(field: &Arc<Field>) -> Box<dyn Technique> {
+    let entry = lod::find("brute-force").expect("in the table");
+    (entry.build)(Arc::clone(field), &Settings::defaults(entry))
 }

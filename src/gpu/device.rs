@@ -87,6 +87,7 @@ fn candidate(instance: &Instance, raw: vk::PhysicalDevice) -> Candidate {
     // SAFETY: `raw` comes from this instance.
     unsafe { instance.raw.get_physical_device_properties2(raw, &mut properties) };
     let properties = properties.properties;
+    // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
     let families = unsafe { instance.raw.get_physical_device_queue_family_properties(raw) };
     let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     let queue_family = families.iter().position(|f| f.queue_flags.contains(wanted));
@@ -189,8 +190,10 @@ impl Gpu {
             .enabled_extension_names(extensions)
             .push_next(&mut v12)
             .push_next(&mut v13);
+        // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let raw = unsafe { instance.raw.create_device(candidate.raw, &info, None) }
             .with_context(|| format!("no logical device on {}", candidate.name))?;
+        // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
@@ -201,7 +204,9 @@ impl Gpu {
             allocation_sizes: Default::default(),
         })
         .context("no allocator")?;
+        // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let limits = unsafe { instance.raw.get_physical_device_properties(candidate.raw) }.limits;
+        // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(candidate.raw) };
         let has_timestamps = families[candidate.queue_family as usize].timestamp_valid_bits > 0;
         let utils = instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));

@@ -37,10 +37,12 @@ impl Instance {
     pub fn new(extensions: &[&CStr], validate: bool) -> Result<Arc<Self>> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, which is what it is for.
         let entry = unsafe { ash::Entry::load() }.context("no Vulkan loader (libvulkan.so.1) on this system")?;
+        // SAFETY: what is pointed to lives until the call returns.
         let version = unsafe { entry.try_enumerate_instance_version() }?.unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             bail!("the Vulkan loader knows version {}, 1.3 is needed", version_text(version));
         }
+        // SAFETY: what is pointed to lives until the call returns.
         let available = unsafe { entry.enumerate_instance_extension_properties(None) }?;
         let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let mut names: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
@@ -53,6 +55,7 @@ impl Instance {
         }
         let mut layers = Vec::new();
         if validate {
+            // SAFETY: what is pointed to lives until the call returns.
             let known = unsafe { entry.enumerate_instance_layer_properties() }?;
             if !known.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
                 bail!("the validation layer {VALIDATION:?} is not installed");
@@ -78,6 +81,7 @@ impl Instance {
         let raw = unsafe { entry.create_instance(&info, None) }.context("no Vulkan instance")?;
         let messenger = if validate {
             let utils = ext::debug_utils::Instance::new(&entry, &raw);
+            // SAFETY: what is pointed to lives until the call returns.
             let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info(&sink), None) }?;
             Some((utils, messenger))
         } else {

@@ -102,16 +102,22 @@ impl Place {
 
 /// Unit and name of the coordinate system that a projection text (`.prj`, well-known text) describes.
 pub fn from_wkt(text: &str) -> Option<(Unit, Option<String>)> {
-    let upper = text.trim().to_uppercase();
-    let crs = epsg(&upper).or_else(|| text.split('"').nth(1).map(str::to_owned));
-    let degrees = ["GEOGCS", "GEOGCRS", "GEODCRS", "GEODETICCRS", "GEOGRAPHICCRS"];
-    if degrees.iter().any(|key| upper.starts_with(key)) {
+    let upper = text.to_ascii_uppercase();
+    let named = |keys: &[&str]| keys.iter().find_map(|key| upper.find(key));
+    // A compound system names a projected or geographic one, and then a vertical one.
+    let end = named(&["VERT_CS[", "VERTCS[", "VERTCRS["]).unwrap_or(upper.len());
+    let projected = named(&["PROJCS[", "PROJCRS[", "PROJECTEDCRS["]);
+    let degrees = named(&["GEOGCS[", "GEOGCRS[", "GEODCRS[", "GEODETICCRS[", "GEOGRAPHICCRS["]);
+    let begin = projected.or(degrees).unwrap_or(0).min(end);
+    let upper = &upper[begin..end];
+    let crs = epsg(upper).or_else(|| text.get(begin..)?.split('"').nth(1).map(str::to_owned));
+    if projected.is_none() && degrees.is_some() {
         return Some((Unit::Degrees, crs));
     }
-    if ["PROJCS", "PROJCRS", "PROJECTEDCRS"].iter().any(|key| upper.starts_with(key)) {
-        let unit = match is_web_mercator(&upper) {
+    if projected.is_some() {
+        let unit = match is_web_mercator(upper) {
             true => Unit::Mercator,
-            false => Unit::Metres(last_unit(&upper).unwrap_or(1.0)),
+            false => Unit::Metres(last_unit(upper).unwrap_or(1.0)),
         };
         return Some((unit, crs));
     }

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use super::{Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, tiles, usgs_dem};
+use super::{Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, terrain_rgb, tiles, usgs_dem};
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
 /// What is done with samples without data.
@@ -219,6 +219,7 @@ pub(super) const HEAD_BYTES: u64 = 4096;
 pub(super) enum Kind {
     Tiff,
     Png,
+    WebP,
     Zip,
     Gzip,
     Asc,
@@ -242,7 +243,7 @@ impl Kind {
             [b'P', b'K', 3, 4, ..] => Kind::Zip,
             [0x1f, 0x8b, 8, ..] => Kind::Gzip,
             [0xff, 0xd8, 0xff, ..] => Kind::Picture("JPEG"),
-            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Kind::Picture("WebP"),
+            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Kind::WebP,
             _ if bil::is_header(head) => Kind::Header,
             _ if asc::is_header(head) => Kind::Asc,
             _ if usgs_dem::is_header(head) => Kind::UsgsDem,
@@ -258,6 +259,7 @@ pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result
     match kind {
         Kind::Tiff => geotiff::read(source, options),
         Kind::Png => png::read(source, options),
+        Kind::WebP => terrain_rgb::read(source, "WebP", options),
         Kind::Zip => archive::read_zip(source, options),
         Kind::Gzip => archive::read_gzip(source, options),
         Kind::Asc => asc::read(source, options),

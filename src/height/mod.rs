@@ -305,6 +305,20 @@ impl Field {
         self
     }
 
+    /// The same heights with data only at holes and at the samples next to them: where land may be missing.
+    pub fn around_holes(&self) -> Field {
+        let [w, h] = self.stored.map(|n| n as usize);
+        let near = |k: usize| {
+            let (i, j) = (k % w, k / w);
+            let mut around = (j.saturating_sub(1)..=(j + 1).min(h - 1))
+                .flat_map(|j| (i.saturating_sub(1)..=(i + 1).min(w - 1)).map(move |i| j * w + i));
+            around.any(|k| self.holes.contains(k))
+        };
+        let mut holes = Holes::none(self.samples.len());
+        (0..self.samples.len()).filter(|&k| !near(k)).for_each(|k| holes.insert(k));
+        Field { holes, ..self.clone() }
+    }
+
     /// Fills the samples under holes by push-pull: means of the known samples on ever coarser grids, then
     /// each hole takes the value of the finest coarser cell that knows one, bilinearly.
     fn fill_holes(&mut self) {

@@ -28,7 +28,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
             terrain_rgb::asked(name, options)?;
             drop(decoder);
             source.reader.rewind().map_err(|e| source.error("byte 0", e))?;
-            return terrain_rgb::read(source, options);
+            return terrain_rgb::read(source, "PNG", options);
         }
     };
     let count = super::load::samples(name, size.map(u64::from), options)?;

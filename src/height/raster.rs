@@ -146,7 +146,10 @@ impl Raster {
             .into_iter()
             .filter(|&(value, count, next, other)| {
                 let (gap, rest) = (distance(value, next), distance(next, other));
-                count > 1 && next.is_finite() && rest > 0.0 && gap > rest * if is_usual(value) { 0.25 } else { 4.0 }
+                count > 1
+                    && next.is_finite()
+                    && rest > 0.0
+                    && gap > rest * if is_usual(f64::from(value) * self.step) { 0.25 } else { 4.0 }
             });
         for (value, count, next, _) in looks_like_nodata {
             let (value, next) = (f64::from(value) * self.step, f64::from(next) * self.step);
@@ -240,9 +243,10 @@ fn distance(a: f32, b: f32) -> f64 {
 }
 
 /// Whether a value is one that programs like to mean "no data".
-fn is_usual(value: f32) -> bool {
-    const USUAL: [f32; 8] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -99999.0, -999.0, 9999.0];
-    USUAL.contains(&value) || value.abs() > 1e30
+fn is_usual(value: f64) -> bool {
+    // −10000 m is black in Mapbox Terrain-RGB.
+    const USUAL: [f64; 9] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -10000.0, -99999.0, -999.0, 9999.0];
+    USUAL.iter().any(|usual| (value - usual).abs() < 1e-3) || value.abs() > 1e30
 }
 
 impl Samples {

@@ -1,6 +1,8 @@
 //! Surfaces over the lattice: triangles whose corners lie on samples' positions, and how far they are from
 //! the samples inside them.
 
+use std::ops::RangeInclusive;
+
 use super::{Field, rtin};
 
 /// A corner of a drawn triangle: lattice position (finest samples) and height, metres.
@@ -37,25 +39,39 @@ pub fn visit_samples(triangle: &Triangle, mut visit: impl FnMut(u32, u32, f64)) 
     let [a, b, c] = triangle;
     let edges = [edge(b, c), edge(c, a), edge(a, b)];
     let heights = triangle.map(|corner| f64::from(corner.y));
-    let (west, east) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+    let (west, east) = (i64::from(a.x.min(b.x).min(c.x)), i64::from(a.x.max(b.x).max(c.x)));
     for z in a.z.min(b.z).min(c.z)..=a.z.max(b.z).max(c.z) {
-        let (mut first, mut last) = (i64::from(west), i64::from(east));
-        let mut rows = [0i64; 3];
-        for (row, &(wx, wz, w0)) in rows.iter_mut().zip(&edges) {
-            *row = wz * i64::from(z) + w0;
-            match wx.signum() {
-                1 => first = first.max((-*row).div_euclid(wx) + i64::from((-*row).rem_euclid(wx) != 0)),
-                -1 => last = last.min(row.div_euclid(-wx)),
-                _ if *row < 0 => last = i64::MIN,
-                _ => {}
-            }
-        }
-        for x in first..=last {
-            let weight = |k: usize| (edges[k].0 * x + rows[k]) as f64;
+        let row = edges.map(|(wx, wz, w0)| [wx, wz * i64::from(z) + w0]);
+        for x in span(&row, west, east) {
+            let weight = |k: usize| (row[k][0] * x + row[k][1]) as f64;
             let y = (weight(0) * heights[0] + weight(1) * heights[1] + weight(2) * heights[2]) / area as f64;
             visit(x as u32, z as u32, y);
         }
     }
+}
+
+/// Rows up to this long are searched for their ends; for longer ones the divisions cost less.
+const SEARCHED: i64 = 16;
+
+/// The x between `west` and `east` at which all edge functions [slope, value at 0] of a row are at least 0.
+fn span(row: &[[i64; 2]; 3], west: i64, east: i64) -> RangeInclusive<i64> {
+    if east - west <= SEARCHED {
+        let inside = |x: &i64| row.iter().all(|[slope, value]| slope * x + value >= 0);
+        return match (west..=east).find(inside) {
+            Some(first) => first..=(first..=east).rfind(inside).unwrap_or(first),
+            None => east + 1..=east,
+        };
+    }
+    let (mut first, mut last) = (west, east);
+    for &[slope, value] in row {
+        match slope.signum() {
+            1 => first = first.max((-value).div_euclid(slope) + i64::from((-value).rem_euclid(slope) != 0)),
+            -1 => last = last.min(value.div_euclid(-slope)),
+            _ if value < 0 => last = west - 1,
+            _ => {}
+        }
+    }
+    first..=last
 }
 
 /// Whether a triangle of the samples' own surface has data at its three corners.

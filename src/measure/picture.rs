@@ -6,6 +6,15 @@ pub fn outline_radius(tolerance_px: f64) -> usize {
     tolerance_px.ceil() as usize + 1
 }
 
+/// Pixels that any pixel of `mask` comes within `radius` of (in x and in y).
+///
+/// # Panics
+/// If the mask is no whole number of rows.
+pub fn widened(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
+    let open: Vec<bool> = mask.iter().map(|m| !m).collect();
+    inside(&open, width, radius).into_iter().map(|m| !m).collect()
+}
+
 /// Pixels, row by row, that `covered` leaves open although `truth` covers every pixel of the picture within
 /// `radius` of them (in x and in y).
 ///

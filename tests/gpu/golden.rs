@@ -2,21 +2,28 @@
 //! `UPDATE_GOLDEN=1` writes them anew; look at them before they are committed.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use cuesta::gpu::Gpu;
+use cuesta::height::synth;
 use cuesta::lod;
 use cuesta::plan::{Colour, Look, ScenePlan};
+use cuesta::view::View;
 
-use super::{aslant, difference, mountains, on_device, technique};
+use super::{aslant, difference, on_device, technique};
 
 /// Largest channel difference of a pixel that counts as the same.
 const THRESHOLD: u8 = 5;
 /// Largest share of pixels that may differ by more.
 const SHARE: f64 = 0.001;
 
-fn compare(gpu: &std::sync::Arc<Gpu>, name: &str, colour: Colour, file: &str) {
-    let field = mountains();
-    let view = aslant(&field, [96, 64], 2.0);
+fn compare(gpu: &Arc<Gpu>, name: &str, colour: Colour, file: &str) {
+    let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
+    let mut view = aslant(&field, [96, 64], 1.0);
+    // Near the ground at one end, so that every level occurs.
+    let statistics = field.statistics();
+    view.eye = field.world_at(20.0, 270.0, f64::from(statistics.max) + 200.0);
+    view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
     let look = Look { colour, ..Look::default() };
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
     let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };

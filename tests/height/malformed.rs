@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use cuesta::height::{Options, load_bytes};
 
 use super::{
-    tiff_file::{Tag, TiffFile},
+    tiff_file::{DEFLATE, NONE, Tag, TiffFile},
     tiny::{self, Tiny},
 };
 
@@ -97,6 +97,10 @@ fn huge_claims_are_refused() {
     let dem = String::from_utf8(tiny::usgs_dem(|_| [0, 3])).unwrap();
     let far = dem.replacen("6.000000000000000D+05", "6.000000000000000D+11", 1).into_bytes();
     let many = dem.replacen("     1     5   ", "     199999   ", 1).into_bytes();
+    // Steps so many that neighbouring rows are the same number.
+    let fine = dem.replacen("  3.000000E1  3.000000E1", "  3.000000E1 1.000000E-9", 1);
+    let fine = fine.replace("5.100000000000000D+06", "5.100000000000000D+11");
+    let fine = fine.replacen("5.100000000000000D+11", "5.100000000000001D+11", 1).into_bytes();
     for (name, bytes) in [
         ("a.tif", tiff(1 << 16, 1 << 15)),
         ("b.tif", tiff(u64::from(u32::MAX), u64::from(u32::MAX))),
@@ -106,6 +110,7 @@ fn huge_claims_are_refused() {
         ("f.asc", asc(1 << 15, 1 << 15)),
         ("g.dem", far),
         ("h.dem", many),
+        ("i.dem", fine),
     ] {
         let start = std::time::Instant::now();
         let error = load_bytes(name, &bytes, &Options::default()).unwrap_err();
@@ -115,6 +120,26 @@ fn huge_claims_are_refused() {
     assert!(error.contains("--max-samples") && error.contains("65536x32768"), "{error}");
     let raw = Options { raw: Some("65536x65536:f32le".parse().unwrap()), ..Options::default() };
     assert!(load_bytes("i.raw", &[0; 64], &raw).unwrap_err().to_string().contains("--max-samples"));
+}
+
+/// Chunks are checked against the file's length, and against what their compression can hold.
+#[test]
+fn chunks_that_lie_are_refused() {
+    let file = TiffFile::new([4, 4], 16, 1);
+    for (tag, compression, words) in [
+        ((279, Tag::Long(vec![16, 99_999])), NONE, ["strip 1", "expected 99999 bytes at byte 24"]),
+        ((279, Tag::Long(vec![15, 16])), NONE, ["strip 0", "found 15 bytes"]),
+        ((257, Tag::Long(vec![4_000_000])), DEFLATE, ["strip 0", "expected enough data for 4x4000000 samples"]),
+    ] {
+        let mut file = TiffFile { compression, ..file.clone() }.tag(tag.0, tag.1);
+        if compression == DEFLATE {
+            // All rows in one strip.
+            file.size[1] = 2;
+            file = file.tag(278, Tag::Long(vec![4_000_000]));
+        }
+        let error = load_bytes("chunk.tif", &file.bytes(|_, _| 1.0), &Options::default()).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    }
 }
 
 #[test]
@@ -152,6 +177,9 @@ fn write_seeds() {
     for file in tiny::all() {
         let wish = u8::from(file.options.raw.is_some()) | u8::from(file.options.encoding.is_some()) << 1;
         let hdr = file.hdr.map(|hdr| [b"\xffH", hdr.as_slice()].concat()).unwrap_or_default();
-        std::fs::write(folder.join(file.name), [vec![wish], file.bytes, hdr].concat()).unwrap();
+        // The target's inputs have at most 4096 bytes: two of five profiles.
+        let is_long = file.bytes.len() > 4096;
+        let bytes = if is_long { [&file.bytes[..863], b"2", &file.bytes[864..3072]].concat() } else { file.bytes };
+        std::fs::write(folder.join(file.name), [vec![wish], bytes, hdr].concat()).unwrap();
     }
 }

@@ -104,6 +104,13 @@ fn grids() {
     close(read(&centre, None).field.spacing, [10.0, 5.0]);
     let feet = r#"PROJCS["x",GEOGCS["y",UNIT["Degree",0.017]],UNIT["Foot_US",0.3048006096012192]]"#;
     close(read(&text, Some(feet)).field.spacing, [3.048006096012192; 2]);
+    let compound = format!(
+        r#"COMPD_CS["c",{},AUTHORITY["EPSG","2225"]],VERT_CS["v",UNIT["m",1],AUTHORITY["EPSG","5"]]]"#,
+        &feet[..feet.len() - 1]
+    );
+    let compound = read(&text, Some(&compound)).field;
+    close(compound.spacing, [3.048006096012192; 2]);
+    assert_eq!(compound.crs.as_deref(), Some("EPSG:2225"));
     let degrees = text.replace("1000", "10").replace("2000", "50").replace("cellsize 10", "cellsize 0.01");
     let guessed = read(&degrees, None);
     assert_eq!(guessed.warnings.len(), 1);

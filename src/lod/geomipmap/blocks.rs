@@ -36,7 +36,7 @@ impl Blocks {
     pub fn new(field: &Field, cells: i32) -> Self {
         let levels = cells.ilog2() + 1;
         let count = field.size().map(|n| (n - 1).div_ceil(cells as u32));
-        let patterns: Vec<_> = (0..levels).map(|level| pattern(cells >> level)).collect();
+        let patterns: Vec<_> = (0..levels).map(|level| pattern(cells, level)).collect();
         let (ranges, errors): (Vec<_>, Vec<_>) = (0..count[0] * count[1])
             .into_par_iter()
             .map(|k| {
@@ -121,10 +121,13 @@ impl Level {
     }
 }
 
-/// Every triangle that a block of `n` cells a side may draw at its level, whatever its mask: a border
-/// triangle depends on one side only, so the masks with no side and with all sides have them all.
-fn pattern(n: i32) -> Vec<[[i32; 2]; 3]> {
-    [mesh::centre(n), mesh::border(n, 0), if n > 1 { mesh::border(n, 15) } else { Vec::new() }].concat()
+/// Every triangle that a block may draw at a level and that may be off the samples, whatever its mask: a border
+/// triangle depends on one side only, so the masks with no side and with all sides have them all. At the finest
+/// level only stitched borders are off.
+fn pattern(cells: i32, level: u32) -> Vec<[[i32; 2]; 3]> {
+    let n = cells >> level;
+    let stitched = if n > 1 { mesh::border(n, 15) } else { Vec::new() };
+    if level == 0 { stitched } else { [mesh::centre(n), mesh::border(n, 0), stitched].concat() }
 }
 
 /// One block while it is measured.

@@ -1,0 +1,261 @@
+//! The program, run as a person runs it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Runs the program in a folder.
+fn cuesta(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+    command.args(arguments).current_dir(folder).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    command.output().expect("the program starts")
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("it ended by itself")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("UTF-8")
+}
+
+/// Runs it with --json and returns the document, which is all of stdout.
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = cuesta(folder, &[arguments, &["--json"]].concat());
+    assert_eq!(code(&output), 0, "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(&stdout(&output)).expect("one JSON document")
+}
+
+/// Holds that a call fails as promised: exit code 2, nothing on stdout, one line on stderr with these parts.
+fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let output = cuesta(folder, arguments);
+    let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(code(&output), 2, "{arguments:?}: {line}");
+    assert_eq!(stdout(&output), "", "{arguments:?}");
+    assert!(line.starts_with("error: ") && line.trim_end().lines().count() == 1, "{arguments:?}: {line}");
+    for part in parts {
+        assert!(line.contains(part), "{arguments:?}: {line:?} lacks {part:?}");
+    }
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder for a test")
+}
+
+fn synth(folder: &Path, kind: &str, size: &str, file: &str) -> PathBuf {
+    json(folder, &["synth", kind, "--size", size, "-o", file]);
+    folder.join(file)
+}
+
+#[test]
+fn info_prints_the_contract() {
+    let info = json(folder().path(), &["info", "demo"]);
+    for field in [
+        "format",
+        "width",
+        "height",
+        "spacing_m",
+        "origin",
+        "crs",
+        "min_m",
+        "max_m",
+        "mean_m",
+        "hole_count",
+        "sample_type",
+        "exact_in_16_bit",
+    ] {
+        assert!(info.get(field).is_some(), "{field}");
+    }
+    assert_eq!((info["width"].as_u64(), info["height"].as_u64()), (Some(1025), Some(1025)));
+    assert_eq!(info["spacing_m"][0].as_f64(), Some(25.0));
+    assert_eq!(info["exact_in_16_bit"].as_bool(), Some(true));
+}
+
+#[test]
+fn options_change_what_is_read() {
+    let folder = folder();
+    let arguments =
+        ["info", "demo", "--crop", "100,200,30,20", "--spacing", "7,9", "--height-scale", "2", "--tile", "2,3"];
+    let info = json(folder.path(), &arguments);
+    assert_eq!((info["width"].as_u64(), info["height"].as_u64()), (Some(60), Some(60)));
+    assert_eq!(
+        info["spacing_m"].as_array().map(|s| s.iter().map(|v| v.as_f64().unwrap()).collect()),
+        Some(vec![7.0, 9.0])
+    );
+    let plain = json(folder.path(), &["info", "demo", "--crop", "100,200,30,20"]);
+    let double = 2.0 * plain["max_m"].as_f64().unwrap();
+    assert!((info["max_m"].as_f64().unwrap() - double).abs() < 1e-3 * double);
+}
+
+#[test]
+fn synth_writes_what_info_reads_in_every_format() {
+    let folder = folder();
+    for file in ["a.tif", "a.png", "a.asc"] {
+        let made = json(folder.path(), &["synth", "cliff", "--size", "33x17", "--seed", "3", "-o", file]);
+        let read = json(folder.path(), &["info", file]);
+        for field in ["width", "height", "min_m", "max_m"] {
+            assert_eq!(made[field], read[field], "{file}: {field}");
+        }
+    }
+    synth(folder.path(), "fractal", "33x17", "a.r16");
+    let raw = json(folder.path(), &["info", "a.r16", "--raw", "33x17:u16le"]);
+    assert_eq!(raw["width"].as_u64(), Some(33));
+    let again = std::fs::read(synth(folder.path(), "fractal", "33x17", "b.r16")).unwrap();
+    assert_eq!(std::fs::read(folder.path().join("a.r16")).unwrap(), again, "the same seed, the same bytes");
+}
+
+#[test]
+fn export_writes_meshes_that_others_read() {
+    let folder = folder();
+    synth(folder.path(), "fractal", "65x49", "a.tif");
+    for (file, magic) in [("m.ply", &b"ply\n"[..]), ("m.obj", b"# x east"), ("m.glb", b"glTF")] {
+        let counts = json(folder.path(), &["export", "a.tif", "-o", file, "--technique", "brute-force"]);
+        assert_eq!(counts["triangles"].as_u64(), Some(2 * 64 * 48), "{file}");
+        assert_eq!(counts["vertices"].as_u64(), Some(65 * 49), "{file}");
+        assert!(std::fs::read(folder.path().join(file)).unwrap().starts_with(magic), "{file}");
+    }
+    let coarse = json(folder.path(), &["export", "a.tif", "-o", "c.obj", "--tolerance", "64"]);
+    assert!(coarse["triangles"].as_u64().unwrap() < 2 * 64 * 48);
+    let obj = std::fs::read_to_string(folder.path().join("c.obj")).unwrap();
+    let faces = obj.lines().filter(|line| line.starts_with("f ")).count();
+    assert_eq!(faces as u64, coarse["triangles"].as_u64().unwrap());
+}
+
+#[test]
+fn wrong_use_is_one_line_and_exit_code_2() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::write(at.join("torn.tif"), b"II*\0\x08\0\0\0\xff\xff").unwrap();
+    std::fs::write(at.join("words.txt"), "these are no heights").unwrap();
+    std::fs::write(at.join("huge.asc"), "ncols 9000000\nnrows 9000000\nxllcorner 0\nyllcorner 0\ncellsize 1\n")
+        .unwrap();
+    refused(at, &["info", "nothing.tif"], &["nothing.tif"]);
+    refused(at, &["info", "torn.tif"], &["torn.tif"]);
+    refused(at, &["info", "words.txt"], &["words.txt", "--raw"]);
+    refused(at, &["info", "huge.asc"], &["huge.asc", "--max-samples"]);
+    refused(at, &["info"], &[]);
+    refused(at, &["info", "demo", "--spacing=-3"], &["--spacing"]);
+    refused(at, &["info", "demo", "--crop", "1,2"], &["--crop"]);
+    refused(at, &["info", "demo", "--crop", "0,0,5000,5"], &["crop"]);
+    refused(at, &["info", "demo", "--max-samples", "1000"], &["--max-samples"]);
+    refused(at, &["export", "demo", "-o", "m.stl"], &["m.stl", ".ply"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--technique", "magic"], &["magic", "geomipmap"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--technique", "geomipmap:magic"], &["magic", "draw-per-block"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--set", "block=66"], &["block=66", "65"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--set", "colour=red"], &["colour", "block"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--tolerance", "0"], &["--tolerance"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--fov", "180"], &["--fov"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--eye", "1,2"], &["--eye"]);
+    refused(at, &["export", "demo", "-o", "no/such/folder/m.ply"], &["m.ply"]);
+    refused(at, &["synth", "castle", "-o", "a.tif"], &["castle"]);
+    refused(at, &["synth", "flat", "--size", "1x1", "-o", "a.tif"], &["--size"]);
+    refused(at, &["synth", "flat", "-o", "a.doc"], &["a.doc"]);
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 3, "nothing is left behind");
+}
+
+#[test]
+fn help_names_every_technique() {
+    let help = stdout(&cuesta(folder().path(), &["export", "--help"]));
+    for entry in cuesta::lod::TECHNIQUES {
+        assert!(help.contains(entry.name), "{}", entry.name);
+    }
+}
+
+#[cfg(feature = "vulkan")]
+mod with_a_device {
+    use super::*;
+
+    /// Whether there is a device; without one, says so.
+    fn has_device() -> bool {
+        let output = cuesta(folder().path(), &["info", "--devices", "--json"]);
+        let found = code(&output) == 0 && stdout(&output).contains("\"usable\": true");
+        assert!(found || std::env::var("REQUIRE_GPU").as_deref() != Ok("1"), "no device");
+        if !found {
+            println!("skipped: no Vulkan device");
+        }
+        found
+    }
+
+    #[test]
+    fn render_measures_what_it_drew() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let view = ["render", "demo", "-o", "p.png", "--size", "160x90", "--measure", "--validate"];
+        for technique in ["brute-force", "geomipmap"] {
+            let rendered = json(folder.path(), &[&view[..], &["--technique", technique]].concat());
+            for field in [
+                "technique",
+                "metric",
+                "tolerance_px",
+                "size",
+                "triangles",
+                "vertices",
+                "draws",
+                "commands",
+                "batches",
+                "levels",
+                "select_ms",
+                "record_ms",
+                "gpu_ms",
+                "device_bytes",
+                "validation_messages",
+                "error_px",
+                "error_m",
+                "hole_pixels",
+                "skirt_pixels",
+                "watertight",
+            ] {
+                assert!(rendered.get(field).is_some(), "{field}");
+            }
+            assert_eq!(rendered["hole_pixels"].as_u64(), Some(0));
+            assert_eq!(rendered["watertight"].as_bool(), Some(true));
+            let error = rendered["error_px"]["max"].as_f64().unwrap();
+            assert!(if technique == "brute-force" { error < 1e-6 } else { error > 0.05 && error <= 1.0 }, "{error}");
+            let picture = image::open(folder.path().join("p.png")).unwrap();
+            assert_eq!((picture.width(), picture.height()), (160, 90));
+        }
+    }
+
+    #[test]
+    fn without_a_subcommand_and_a_display_a_picture_is_drawn() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let output = cuesta(folder.path(), &[]);
+        assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(String::from_utf8_lossy(&output.stderr).contains("cuesta.png"));
+        assert!(folder.path().join("cuesta.png").is_file());
+    }
+
+    #[test]
+    fn what_the_device_cannot_do_is_named() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        refused(folder.path(), &["render", "demo", "-o", "p.png", "--device", "no such device"], &["no such device"]);
+        refused(folder.path(), &["render", "demo", "-o", "p.png", "--size", "99999x10"], &["maxImageDimension2D"]);
+        refused(folder.path(), &["render", "demo", "-o", "p.jpg"], &["p.jpg", ".png"]);
+        assert!(!folder.path().join("p.png").exists(), "no half a picture");
+    }
+
+    #[test]
+    fn the_plan_says_what_is_left_out() {
+        if !has_device() {
+            return;
+        }
+        let plan = json(folder().path(), &["info", "demo", "--plan"]);
+        let names = |list: &str| -> Vec<String> {
+            plan[list].as_array().unwrap().iter().map(|d| d["feature"].as_str().unwrap().to_string()).collect()
+        };
+        assert!(names("kept").contains(&"overlay".to_string()));
+        assert!(names("left_out").contains(&"fog".to_string()) && names("left_out").contains(&"hole mask".to_string()));
+        let figures = plan["figures"].as_array().unwrap();
+        let value = |name: &str| figures.iter().find(|f| f["name"] == name).and_then(|f| f["value"].as_f64()).unwrap();
+        assert!(value("index bytes, six classes") < value("index bytes, sixteen masks"));
+    }
+}
