@@ -395,3 +395,33 @@ fn extent(capabilities: &vk::SurfaceCapabilitiesKHR, window: [u32; 2]) -> [u32; 
     let within = |value: u32, low: u32, high: u32| if value == 0 { 0 } else { value.max(low).min(high) };
     [within(window[0], low.width, high.width), within(window[1], low.height, high.height)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_the_surfaces_or_the_windows_within_limits_or_nothing() {
+        let size = |width, height| vk::Extent2D { width, height };
+        let left_to_us = vk::SurfaceCapabilitiesKHR {
+            current_extent: size(u32::MAX, u32::MAX),
+            min_image_extent: size(10, 10),
+            max_image_extent: size(100, 100),
+            ..Default::default()
+        };
+        assert_eq!(extent(&left_to_us, [50, 5000]), [50, 100]);
+        assert_eq!(extent(&left_to_us, [1, 50]), [10, 50]);
+        assert_eq!(extent(&left_to_us, [0, 50]), [0, 50], "minimised");
+        let own = vk::SurfaceCapabilitiesKHR { current_extent: size(0, 0), ..left_to_us };
+        assert_eq!(extent(&own, [50, 50]), [0, 0], "minimised");
+    }
+
+    #[test]
+    fn srgb_is_preferred() {
+        let format = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
+        let [unorm, srgb] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_SRGB].map(format);
+        assert_eq!(preferred(&[unorm, srgb]).unwrap(), srgb);
+        assert_eq!(preferred(&[unorm]).unwrap(), unorm);
+        assert!(preferred(&[]).is_err());
+    }
+}

@@ -15,11 +15,12 @@ use super::bindings::{self, Action, Binding, Trigger};
 use super::camera::Motion;
 use super::hud::{self, Content};
 use super::session::{Request, Session, free_path};
-use super::stage::{Shot, Shown, Stage};
+use super::stage::{Figures, Shot, Shown, Stage};
 use super::times::Times;
 use super::{Setup, Summary};
 use crate::gpu::instance::Messages;
 use crate::gpu::{Instance, swapchain};
+use crate::lod::{Entry, Settings};
 use crate::view::Lens;
 
 /// How long to sleep while there is nothing to draw to.
@@ -124,16 +125,19 @@ impl<'a> App<'a> {
         let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
         self.session.advance(self.setup, &motion, &open.stage.figures, dt.unwrap_or(0.0));
         let view = self.session.view(self.setup, size);
-        let content = Content {
-            rows: self.session.rows(self.setup, &open.stage.figures),
-            help: self.session.helps.then_some(self.bindings.as_slice()),
-            // A screenshot does not tell of the one before.
-            note: self.session.note().filter(|_| !self.session.wants_copy),
-        };
-        let overlay = hud::paint(&open.context, size, open.window.scale_factor() as f32, &content);
         let Session { look, frozen, wants_copy, .. } = self.session;
-        let shot = Shot { view: &view, look: &look, frozen, overlay, wants_copy };
-        if let Some(shown) = open.stage.show(self.setup, shot)? {
+        let scale = open.window.scale_factor() as f32;
+        let overlay = |figures: &Figures| {
+            let content = Content {
+                rows: self.session.rows(self.setup, figures),
+                help: self.session.helps.then_some(self.bindings.as_slice()),
+                // A screenshot does not tell of the one before.
+                note: self.session.note().filter(|_| !wants_copy),
+            };
+            hud::paint(&open.context, size, scale, &content)
+        };
+        let shot = Shot { view: &view, look: &look, frozen, wants_copy };
+        if let Some(shown) = open.stage.show(self.setup, &shot, overlay)? {
             if let Some(dt) = dt {
                 self.times.add(dt * 1e3);
             }
@@ -158,21 +162,31 @@ impl<'a> App<'a> {
     }
 
     fn perform(&mut self, event_loop: &ActiveEventLoop, action: Action) -> Result<()> {
+        let before = self.session.technique.clone();
         let request = self.session.perform(self.setup, action);
         let Some(open) = &mut self.open else { return Ok(()) };
         match request {
             Request::Nothing => return Ok(()),
             Request::Quit => event_loop.exit(),
             Request::Look => open.stage.set_look(self.setup, &self.session.look)?,
-            Request::Technique => {
-                let (entry, settings) = &self.session.technique;
-                open.window.set_title(&format!("cuesta: preparing {}", entry.name));
-                open.stage.set_technique(self.setup, entry, settings)?;
-                open.window.set_title(&self.session.title(self.setup));
-            }
+            Request::Technique => self.prepare(before)?,
         }
         // What took long was no frame.
         self.last_frame = None;
+        Ok(())
+    }
+
+    /// Prepares the session's technique, or goes back to the one before if this device cannot hold it.
+    fn prepare(&mut self, before: (&'static Entry, Settings)) -> Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let (entry, settings) = &self.session.technique;
+        open.window.set_title(&format!("cuesta: preparing {}", entry.name));
+        if let Err(error) = open.stage.set_technique(self.setup, entry, settings) {
+            self.session.tell(format!("{}: {error:#}", entry.name));
+            open.stage.set_technique(self.setup, before.0, &before.1)?;
+            self.session.technique = before;
+        }
+        open.window.set_title(&self.session.title(self.setup));
         Ok(())
     }
 
@@ -258,7 +272,8 @@ fn degrees_across(lens: Lens) -> f64 {
 
 impl ApplicationHandler<Stop> for App<'_> {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        event_loop.set_control_flow(ControlFlow::Poll);
+        // Every frame asks for the next one, and the window system says when.
+        event_loop.set_control_flow(ControlFlow::Wait);
         if self.open.is_none() {
             let opened = self.open(event_loop);
             self.check(event_loop, opened);
@@ -275,8 +290,13 @@ impl ApplicationHandler<Stop> for App<'_> {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
-        if self.setup.seconds.is_some_and(|seconds| self.started.elapsed().as_secs_f64() >= seconds) {
-            event_loop.exit();
+        if let Some(seconds) = self.setup.seconds {
+            let left = seconds - self.started.elapsed().as_secs_f64();
+            if left <= 0.0 {
+                event_loop.exit();
+            }
+            let left = Duration::try_from_secs_f64(left.min(1.0)).unwrap_or_default();
+            event_loop.set_control_flow(ControlFlow::wait_duration(left));
         }
         if let Some(open) = &self.open {
             open.window.request_redraw();

@@ -3,8 +3,12 @@
 //! It takes no input. Every character it may show is laid out in every frame, so that the font's texture is
 //! whole from the start and never grows while frames are under way.
 
+use std::sync::Arc;
+
 use egui::epaint::ClippedPrimitive;
-use egui::{Align2, Color32, Context, FontId, LayerId, Painter, Pos2, RawInput, Rect, TexturesDelta, Vec2, ViewportId};
+use egui::{
+    Align2, Color32, Context, FontId, Galley, LayerId, Painter, Pos2, RawInput, Rect, TexturesDelta, Vec2, ViewportId,
+};
 
 use super::bindings::Binding;
 
@@ -47,20 +51,26 @@ pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -
     context.begin_pass(input);
     let painter = context.layer_painter(LayerId::background());
     let every: String = (' '..='~').collect();
-    let _ = painter.layout_no_wrap(every, font(SIZE), TEXT);
+    let _ = painter.layout_no_wrap(every, FontId::monospace(SIZE), TEXT);
     let inner = screen.shrink(MARGIN);
-    if !content.rows.is_empty() {
-        table(&painter, (inner.min, Align2::LEFT_TOP), None, &content.rows, fitting(&painter, inner, &content.rows));
-    }
+    let mut taken = Rect::NOTHING;
     if let Some(bindings) = content.help {
         let rows: Vec<Row> = bindings.iter().map(|row| (row.keys(), row.about.clone())).collect();
         let size = fitting(&painter, inner.shrink(SIZE * 1.5), &rows);
-        table(&painter, (screen.center(), Align2::CENTER_CENTER), Some("Keys"), &rows, size);
+        let table = Table::new(&painter, (screen.center(), Align2::CENTER_CENTER), Some("Keys"), &rows, size);
+        taken = table.plate;
+        table.paint(&painter);
+    }
+    let size = fitting(&painter, inner, &content.rows);
+    let table = Table::new(&painter, (inner.min, Align2::LEFT_TOP), None, &content.rows, size);
+    // In a small window the help stands alone.
+    if !content.rows.is_empty() && !table.plate.intersects(taken) {
+        table.paint(&painter);
     }
     if let Some(note) = content.note {
         let rows = [(note.to_string(), String::new())];
         let at = (inner.center_bottom(), Align2::CENTER_BOTTOM);
-        table(&painter, at, None, &rows, fitting(&painter, inner, &rows));
+        Table::new(&painter, at, None, &rows, fitting(&painter, inner, &rows)).paint(&painter);
     }
     let output = context.end_pass();
     let pixels_per_point = output.pixels_per_point;
@@ -71,42 +81,52 @@ pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -
     }
 }
 
-fn font(size: f32) -> FontId {
-    FontId::monospace(size)
-}
-
 fn joined(rows: &[Row], part: impl Fn(&Row) -> &str) -> String {
     rows.iter().map(part).collect::<Vec<_>>().join("\n")
 }
 
 /// The size of type at which a table fits the space: the usual one if there is room.
 fn fitting(painter: &Painter, space: Rect, rows: &[Row]) -> f32 {
-    let line: Vec<_> = rows.iter().map(|(a, b)| a.len().max(b.len())).collect();
-    let (names, values) = (rows.iter().map(|r| r.0.len()).max(), rows.iter().map(|r| r.1.len()).max());
-    let sample = painter.layout_no_wrap("0".to_string(), font(SIZE), TEXT).size();
-    let columns = (names.unwrap_or(0) + values.unwrap_or(0)) as f32 * sample.x + 5.0 * MARGIN;
-    let height = line.len() as f32 * sample.y + 2.0 * MARGIN;
-    let room = (space.width() / columns).min(space.height() / height).min(1.0);
+    let letter = painter.layout_no_wrap("0".to_string(), FontId::monospace(SIZE), TEXT).size();
+    let longest = |part: fn(&Row) -> &String| rows.iter().map(|row| part(row).len()).max().unwrap_or(0) as f32;
+    let width = (longest(|row| &row.0) + longest(|row| &row.1)) * letter.x + 5.0 * MARGIN;
+    let height = rows.len() as f32 * letter.y + 2.0 * MARGIN;
+    let room = (space.width() / width).min(space.height() / height).min(1.0);
     // Half-point steps: fewer sizes of the font.
     (SIZE * room * 2.0).floor().max(8.0) / 2.0
 }
 
-/// Two columns on a dark plate.
-fn table(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, rows: &[Row], size: f32) {
-    let names = painter.layout_no_wrap(joined(rows, |row| &row.0), font(size), FAINT);
-    let values = painter.layout_no_wrap(joined(rows, |row| &row.1), font(size), TEXT);
-    let title = title.map(|text| painter.layout_no_wrap(text.to_string(), font(size), TITLE));
-    let head = title.as_ref().map_or(0.0, |galley| galley.size().y * 1.4);
-    let gap = if values.size().x > 0.0 { MARGIN * 2.0 } else { 0.0 };
-    let inner = Vec2::new(names.size().x + gap + values.size().x, head + names.size().y);
-    let plate = align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN));
-    painter.rect_filled(plate, 4.0, Color32::from_black_alpha(232));
-    let corner = plate.min + Vec2::splat(MARGIN);
-    if let Some(galley) = title {
-        painter.galley(corner, galley, TITLE);
+/// Where a table lies, and what it is made of.
+struct Table {
+    plate: Rect,
+    title: Option<Arc<Galley>>,
+    names: Arc<Galley>,
+    values: Arc<Galley>,
+    /// Where the values begin, and the rows.
+    indent: Vec2,
+}
+
+impl Table {
+    /// Two columns under a title.
+    fn new(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, rows: &[Row], size: f32) -> Self {
+        let lay = |text: String, colour| painter.layout_no_wrap(text, FontId::monospace(size), colour);
+        let (names, values) = (lay(joined(rows, |row| &row.0), FAINT), lay(joined(rows, |row| &row.1), TEXT));
+        let title = title.map(|text| lay(text.to_string(), TITLE));
+        let head = title.as_ref().map_or(0.0, |galley| galley.size().y * 1.4);
+        let gap = if values.size().x > 0.0 { MARGIN * 2.0 } else { 0.0 };
+        let indent = Vec2::new(names.size().x + gap, head);
+        let inner = Vec2::new(indent.x + values.size().x, head + names.size().y);
+        Self { plate: align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN)), title, names, values, indent }
     }
-    let aside = Vec2::new(names.size().x + gap, 0.0);
-    let below = corner + Vec2::new(0.0, head);
-    painter.galley(below, names, FAINT);
-    painter.galley(below + aside, values, TEXT);
+
+    /// Paints it on a dark plate.
+    fn paint(self, painter: &Painter) {
+        painter.rect_filled(self.plate, 4.0, Color32::from_black_alpha(232));
+        let corner = self.plate.min + Vec2::splat(MARGIN);
+        if let Some(title) = self.title {
+            painter.galley(corner, title, TITLE);
+        }
+        painter.galley(corner + Vec2::new(0.0, self.indent.y), self.names, FAINT);
+        painter.galley(corner + self.indent, self.values, TEXT);
+    }
 }

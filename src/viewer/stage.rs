@@ -54,8 +54,6 @@ pub struct Shot<'a> {
     pub look: &'a Look,
     /// Whether the last selection stays.
     pub frozen: bool,
-    /// What lies over it.
-    pub overlay: Painted,
     /// Whether a copy is wanted.
     pub wants_copy: bool,
 }
@@ -114,10 +112,14 @@ impl Stage {
         self.swapchain.fit(window)
     }
 
-    /// Draws and shows a frame. `None`: the window could not take it, and the frame was dropped before anything
-    /// was selected.
-    pub fn show(&mut self, setup: &Setup, mut shot: Shot) -> Result<Option<Shown>> {
-        self.hud.update(std::mem::take(&mut shot.overlay.textures))?;
+    /// Draws and shows a frame; `overlay` lays out what lies over it, from its figures. `None`: the window could
+    /// not take it, and the frame was dropped before anything was selected.
+    pub fn show(
+        &mut self,
+        setup: &Setup,
+        shot: &Shot,
+        overlay: impl FnOnce(&Figures) -> Painted,
+    ) -> Result<Option<Shown>> {
         let copy = if shot.wants_copy { self.swapchain.screenshot().ok() } else { None };
         let mut recording = self.frames.begin()?;
         let Some(image) = self.swapchain.acquire(recording.slot)? else { return Ok(None) };
@@ -130,12 +132,15 @@ impl Stage {
             self.technique.select(shot.view, &mut self.list);
         }
         self.figures.select_ms = ms(started);
+        (self.figures.triangles, self.figures.draws) = (self.list.triangles(), self.list.draws.len());
+        let mut overlay = overlay(&self.figures);
+        self.hud.update(std::mem::take(&mut overlay.textures))?;
         let started = Instant::now();
         let frame = shot.look.frame(&setup.field, shot.view, self.range);
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         target::begin(&recording, image.attachment, self.swapchain.depth());
         self.terrain.draw(&mut recording, &self.list)?;
-        let Painted { primitives, pixels_per_point, .. } = &mut shot.overlay;
+        let Painted { primitives, pixels_per_point, .. } = &mut overlay;
         self.hud.draw(&mut recording, shot.view.size, *pixels_per_point, primitives)?;
         target::end(&recording);
         self.swapchain.finish(&recording, &image, copy.as_ref());
@@ -143,7 +148,6 @@ impl Stage {
         self.frames.submit(Some(image.wait), Some(image.signal))?;
         self.swapchain.present(&image)?;
         self.figures.gpu_ms = self.frames.timing.total_ms;
-        (self.figures.triangles, self.figures.draws) = (self.list.triangles(), self.list.draws.len());
         if copy.is_some() {
             self.frames.finish()?;
         }
