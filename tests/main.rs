@@ -6,5 +6,6 @@ mod conformance;
 #[cfg(feature = "vulkan")]
 mod gpu;
 mod height;
+mod lod;
 mod measure;
 mod synth;
