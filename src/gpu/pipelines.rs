@@ -221,16 +221,19 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
             ],
         ),
     };
-    let instance = [
+    let mut instance = vec![
         (8, PAIR, offset_of!(Instance, origin)),
         (9, UINT, offset_of!(Instance, cells)),
         (10, UINT, offset_of!(Instance, shift)),
         (11, UINT, offset_of!(Instance, turns)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
-        (14, FLOAT, offset_of!(Instance, morph)),
-        (15, SIDES, offset_of!(Instance, edge_morph)),
     ];
+    // Explicit vertices have weights of their own.
+    if source == Source::Lattice {
+        instance.push((14, FLOAT, offset_of!(Instance, morph)));
+        instance.push((15, SIDES, offset_of!(Instance, edge_morph)));
+    }
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (shader, stride as u32, attributes)
 }

@@ -5,13 +5,12 @@
 //! depends on, or, inside next to a side, with v and with the e of the sides that its target's ends lie on. So
 //! above any sample the drawn height is affine in each weight while the others stay, between whole numbers, and
 //! the largest distance from the sample is at a corner of that cube: v in {0, 1}, each e in {0, 1, 2}. The
-//! corners are shapes, and the shapes are measured. Most of them are what a level draws anyway, stitched or
-//! not; new are
-//! - v = 0 where e = 2: level l inside and two levels coarser on the side;
-//! - v = 1 where e = 0: level l + 1 inside and level l on the side. Only here a triangle, near a corner of the
-//!   block, depends on two sides at once.
+//! corners are shapes, and the shapes are measured. As a triangle depends on one side only (at a block's corners
+//! too, where cells have their diagonals from that corner, at both levels), all sides are measured at the same e.
+//! Most corners are what a level draws anyway, stitched or not; new are v = 0 with e = 2, level l inside and two
+//! levels coarser on the sides, and v = 1 with e = 0, level l + 1 inside and level l on the sides.
 
-use super::mesh::{self, side};
+use super::mesh;
 use crate::draw::Instance;
 use crate::draw::layout::Frame;
 use crate::draw::place::{lattice_height, lattice_position, turned_position};
@@ -39,24 +38,17 @@ impl Shape {
         std::iter::once(still).chain(way).collect()
     }
 
-    /// The corners of the module's text from `level` to the next.
+    /// The new corners of the module's text from `level` to the next.
     fn on_the_way(cells: i32, level: u32) -> Vec<Shape> {
         let n = cells >> level;
-        let shape = |morph: f32, [upright, level_ones]: [f32; 2]| {
-            let edge_morph = [upright, level_ones, upright, level_ones];
-            let mask = [side::LEFT, side::TOP, side::RIGHT, side::BOTTOM].iter().zip(edge_morph);
-            let mask = mask.filter(|(_, e)| *e >= 1.0).map(|(bit, _)| bit).sum();
-            let mut triangles = [mesh::border(n, mask), mesh::inner_border(n)].concat();
-            if upright != level_ones {
-                let near = |k: i32| k <= 2 || k >= n - 2;
-                triangles.retain(|t| t.iter().all(|at| near(at[0]) && near(at[1])));
-            }
-            Shape { level, morph, edge_morph, triangles }
+        let shape = |(morph, side): (f32, f32)| {
+            let mask = if side < 1.0 { 0 } else { 15 };
+            let triangles = [mesh::border(n, mask), mesh::inner_border(n)].concat();
+            Shape { level, morph, edge_morph: [side; 4], triangles }
         };
-        let ways = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 2.0], [2.0, 0.0]].map(|e| shape(1.0, e));
         // No level is two levels coarser than that of two cells.
-        let has_second = |s: &Shape| n > 2 || s.edge_morph.iter().all(|e| *e < 2.0);
-        ways.into_iter().chain([shape(0.0, [2.0, 2.0])]).filter(has_second).collect()
+        let corners = [(1.0, 0.0), (0.0, 2.0)].into_iter().filter(|(_, side)| *side < 2.0 || n > 2);
+        corners.map(shape).collect()
     }
 }
 
@@ -158,4 +150,57 @@ impl<'a> Block<'a> {
 /// A block of a single cell takes its diagonal from its own parity among the blocks.
 pub fn coarsest_turn(at: [i32; 2], n: i32) -> u32 {
     u32::from(n == 1 && (at[0] + at[1]) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    const CELLS: i32 = 16;
+
+    /// 2 × 2 blocks, rough only near a column of samples, or near one sample.
+    fn rough_near(x: u32, z: Option<u32>, random: &mut impl FnMut() -> f32) -> Field {
+        let size = 2 * CELLS as u32 + 1;
+        let near = |k: u32| (k % size).abs_diff(x) < 3 && z.is_none_or(|z| (k / size).abs_diff(z) < 3);
+        let heights = (0..size * size).map(|k| if near(k) { 100.0 * random() } else { 0.0 });
+        Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
+    }
+
+    /// ε of everything a block draws at given weights.
+    fn drawn_error(block: &Block, level: u32, morph: f32, edge_morph: [f32; 4]) -> f32 {
+        let (n, mask) = (CELLS >> level, (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum());
+        let triangles = [mesh::border(n, mask), mesh::centre(n)].concat();
+        block.error(&Shape { level, morph, edge_morph, triangles })
+    }
+
+    #[test]
+    fn no_weights_between_the_corners_exceed_the_error() {
+        let mut seed = 3u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        let (mut beyond_still, mut closest) = (0, 0.0f32);
+        for k in 0..132 {
+            let z = (k >= 66).then_some(14 + k / 7 % 5);
+            let field = rough_near(k % 33, z, &mut random);
+            let block = Block::new(&field, CELLS, [(k / 2 % 2) as i32, (k % 2) as i32]);
+            let errors =
+                |morph| block.errors(&(0..5).map(|level| Shape::up_to(CELLS, level, morph)).collect::<Vec<_>>());
+            let (errors, still) = (errors(true), errors(false));
+            for (level, draw) in (0..4).flat_map(|level| (0..20).map(move |draw| (level, draw))) {
+                let furthest = if level == 3 { 1.0 } else { 2.0 };
+                // Half of them at the corners.
+                let mut weight = |most: f32| if draw < 10 { most * random() } else { (most * random()).round() };
+                let (v, e) = (weight(1.0), [0; 4].map(|_| weight(furthest)));
+                let (error, bound) = (drawn_error(&block, level, v, e), errors[level as usize + 1]);
+                assert!(error <= bound, "level {level}, {v} inside, sides {e:?}: {error} m of {bound} m");
+                beyond_still += usize::from(error > still[level as usize + 1]);
+                closest = closest.max(error / bound.max(f32::MIN_POSITIVE));
+            }
+        }
+        // The shapes on the way are needed, and no more than needed.
+        assert!(beyond_still > 10 && closest > 0.999, "{beyond_still} beyond what levels draw, {closest} of the bound");
+    }
 }
