@@ -1,6 +1,6 @@
 //! Which level a block takes in a view, and how neighbours are brought within one level of each other.
 
-use super::HYSTERESIS;
+use super::MORPH_RATIO;
 use super::blocks::Blocks;
 use crate::view::View;
 
@@ -37,7 +37,7 @@ impl Distance {
     /// From which to which ratio a block morphs.
     fn band(self) -> [f64; 2] {
         match self {
-            Distance::Error => [1.0, HYSTERESIS],
+            Distance::Error => [1.0, MORPH_RATIO],
             // The last 30 % of the way between two levels; exponential ones begin at half the ratio.
             Distance::Linear(_) => [0.7, 1.0],
             Distance::Exponential(_) => [0.85, 1.0],

@@ -32,9 +32,9 @@ use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission
 use crate::height::Field;
 use crate::view::View;
 
-/// A morphing block begins to leave a level where the next one's error fits the tolerance, and has left it
-/// where that error is this much smaller: longer morphs cost triangles, shorter ones are seen.
-const HYSTERESIS: f64 = 1.3;
+/// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
+/// has left it at this many times that error: a longer way draws the finer level for longer, a shorter one is seen.
+const MORPH_RATIO: f64 = 1.3;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
