@@ -9,10 +9,10 @@
 layout(location = 0) in ivec2 in_position;
 layout(location = 1) in float in_height;
 layout(location = 2) in float in_target;
-layout(location = 3) in float in_morph;
+layout(location = 3) in float in_weight;
 
 void main() {
     Instance instance = instance_attributes();
-    ivec2 at = lattice_position(instance, in_position);
-    emit_vertex(at, morphed_height(in_height, in_target, in_morph), instance);
+    ivec2 at = lattice_position(instance, turned_position(instance, in_position));
+    emit_vertex(at, morphed_height(in_height, in_target, in_weight), instance);
 }

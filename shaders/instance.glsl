@@ -6,7 +6,9 @@ layout(location = 10) in uint in_shift;
 layout(location = 11) in uint in_turns;
 layout(location = 12) in uint in_level;
 layout(location = 13) in uint in_batch;
+layout(location = 14) in float in_morph;
+layout(location = 15) in vec4 in_edge_morph;
 
 Instance instance_attributes() {
-    return Instance(in_origin, in_cells, in_shift, in_turns, in_level, in_batch);
+    return Instance(in_origin, in_cells, in_shift, in_turns, in_level, in_batch, in_morph, in_edge_morph);
 }

@@ -10,6 +10,7 @@ layout(location = 0) in ivec2 in_position;
 
 void main() {
     Instance instance = instance_attributes();
-    ivec2 at = lattice_position(instance, in_position);
-    emit_vertex(at, sample_height(at), instance);
+    ivec2 turned = turned_position(instance, in_position);
+    float height = MORPH ? lattice_height(instance, turned) : sampled_height(instance, turned);
+    emit_vertex(lattice_position(instance, turned), height, instance);
 }

@@ -16,9 +16,10 @@ void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= queries.length()) return;
     Query query = queries[k];
-    ivec2 at = lattice_position(query.instance, query.vertex.position);
-    float height = query.explicit_height == 0
-        ? sample_height(at)
-        : morphed_height(query.vertex.height, query.vertex.target, query.vertex.morph);
-    answers[k] = relative_position(at, height);
+    ivec2 turned = turned_position(query.instance, query.vertex.position);
+    float height;
+    if (query.explicit_height != 0) height = morphed_height(query.vertex.height, query.vertex.target, query.vertex.morph);
+    else if (MORPH) height = lattice_height(query.instance, turned);
+    else height = sampled_height(query.instance, turned);
+    answers[k] = relative_position(lattice_position(query.instance, turned), height);
 }

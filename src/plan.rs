@@ -75,6 +75,8 @@ pub struct ScenePlan {
     pub page_shift: u32,
     /// Normals filter heights with the device's sampler.
     pub filtered: bool,
+    /// Lattice vertices go over to the next coarser level.
+    pub morph: bool,
     /// Timestamps and pipeline statistics are taken.
     pub measured: bool,
     /// Samples stored along (x, z).
@@ -106,6 +108,7 @@ impl ScenePlan {
             wireframe: look.wireframe,
             page_shift,
             filtered: device.filters_heights && page_shift == 0,
+            morph: false,
             measured: true,
             stored,
         };
@@ -120,6 +123,11 @@ impl ScenePlan {
             ));
         }
         Ok(plan)
+    }
+
+    /// The plan for a technique that morphs, or does not.
+    pub fn with_morph(self, morph: bool) -> Self {
+        Self { morph, ..self }
     }
 
     /// Texels of a page of the height texture (x, z).
@@ -162,6 +170,7 @@ impl ScenePlan {
             sort(self.tiled, "tiling", "the field repeats", "the field does not repeat", 0),
             sort(self.page_shift > 0, "height pages", "the field exceeds one image", "one image holds the field", 0),
             sort(!self.filtered, "filtering in the shader", "the device cannot", "the device's sampler does it", 0),
+            sort(self.morph, "morphing", "the technique morphs", "no lattice vertex morphs", 0),
             sort(self.fog, "fog", "asked for", "density 0", 0),
             sort(overlay, "overlay", "asked for", "no picture is laid over", 0),
             sort(self.wireframe, "wireframe", "asked for", "faces are filled", 0),

@@ -6,6 +6,7 @@ mod conformance;
 #[cfg(feature = "vulkan")]
 mod gpu;
 mod height;
+mod lod;
 mod measure;
 mod readme;
 mod synth;

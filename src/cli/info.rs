@@ -108,9 +108,10 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     }
     let (look, _) = args.look.build(terrain)?;
     let plan = ScenePlan::new(&loaded.field, &look, &device_limits(common)?).map_err(anyhow::Error::msg)?;
-    let (kept, left_out) = plan.decisions(&loaded.field);
     let (entry, _) = args.technique.settings()?;
-    let technique = args.technique.build(common, &std::sync::Arc::new(loaded.field))?;
+    let field = std::sync::Arc::new(loaded.field);
+    let technique = args.technique.build(common, &field)?;
+    let (kept, left_out) = plan.with_morph(technique.morphs()).decisions(&field);
     let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
     report::print(common, &Plan { technique: entry.name, kept, left_out, figures })?;
     Ok(Outcome::Done)

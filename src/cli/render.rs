@@ -127,6 +127,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+    let plan = plan.with_morph(technique.morphs());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot_often(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;

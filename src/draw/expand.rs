@@ -1,7 +1,7 @@
 //! From a draw list to its triangles, on the CPU: what the device draws, without a device.
 
 use super::layout::Frame;
-use super::place::{lattice_position, morphed_height};
+use super::place::{lattice_height, lattice_position, morphed_height, turned_position};
 use super::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
@@ -87,12 +87,13 @@ fn visit_instance(
 fn corner(field: &Field, frame: &Frame, geometry: &Geometry, source: Source, placed: &Instance, index: u32) -> Corner {
     match source {
         Source::Lattice => {
-            let [x, z] = lattice_position(frame, placed, geometry.lattice[index as usize].position);
-            Corner { x, z, y: field.height(x as u32, z as u32) }
+            let turned = turned_position(placed, geometry.lattice[index as usize].position);
+            let [x, z] = lattice_position(frame, placed, turned);
+            Corner { x, z, y: lattice_height(field, frame, placed, turned) }
         }
         Source::Resident | Source::Streamed => {
             let vertex = &geometry.vertices[index as usize];
-            let [x, z] = lattice_position(frame, placed, vertex.position);
+            let [x, z] = lattice_position(frame, placed, turned_position(placed, vertex.position));
             Corner { x, z, y: morphed_height(vertex.height, vertex.target, vertex.morph) }
         }
     }

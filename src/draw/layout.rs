@@ -88,10 +88,15 @@ shared! {
         shift: uint,
         /// Quarter turns about the mesh's centre, 0–3.
         turns: uint,
-        /// Level of detail, 0 the finest: for colouring and counting.
+        /// Level of detail, 0 the finest: for morphing, colouring and counting.
         level: uint,
         /// Which batch drew it: for colouring.
         batch: uint,
+        /// How far the inner vertices have gone to the next coarser level, 0 to 1.
+        morph: float,
+        /// The same for those of the sides x = 0, z = 0, x = cells and z = cells after the turn, 0 to 2:
+        /// past 1 the side has left the next coarser level for the one after it.
+        edge_morph: vec4,
     }
 
     /// A vertex of a lattice mesh: its height is found in the height texture.

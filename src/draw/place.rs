@@ -34,18 +34,82 @@ impl Frame {
     }
 }
 
-/// Lattice position of a mesh vertex: turned, scaled, moved, and held inside the field, so that the part of
-/// a mesh that sticks out collapses onto the field's edge.
-pub fn lattice_position(frame: &Frame, instance: &Instance, position: [i32; 2]) -> [i32; 2] {
+/// A mesh vertex turned as its instance says, in mesh units.
+pub fn turned_position(instance: &Instance, [x, z]: [i32; 2]) -> [i32; 2] {
     let cells = instance.cells as i32;
-    let [x, z] = position;
-    let turned = match instance.turns {
+    match instance.turns {
         0 => [x, z],
         1 => [cells - z, x],
         2 => [cells - x, cells - z],
         _ => [z, cells - x],
-    };
+    }
+}
+
+/// Lattice position of a turned mesh vertex: scaled, moved, and held inside the field, so that the part of a
+/// mesh that sticks out collapses onto the field's edge.
+pub fn lattice_position(frame: &Frame, instance: &Instance, turned: [i32; 2]) -> [i32; 2] {
     [0, 1].map(|k| (instance.origin[k] + (turned[k] << instance.shift)).min(frame.last[k]))
+}
+
+/// Height of a turned mesh vertex. One inside the mesh that the next coarser level lacks goes to the midpoint of
+/// the edge of that level on which it lies, as far as the instance's morph says.
+pub fn lattice_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
+    if on_edge(instance, turned) {
+        return edge_height(field, frame, instance, turned);
+    }
+    let sampled = sampled_height(field, frame, instance, turned);
+    let step = 1 << instance.level;
+    let mut apart = turned.map(|n| n & step);
+    if instance.morph == 0.0 || apart == [0, 0] {
+        return sampled;
+    }
+    if apart[0] == apart[1] {
+        // The diagonal of the coarser cell: it turns with the parity of the cell's place in the whole field.
+        let cell =
+            |k: usize| (instance.origin[k] + (turned[k] << instance.shift)) >> (instance.shift + instance.level + 1);
+        if (cell(0) + cell(1)) & 1 == 1 {
+            apart[1] = -apart[1];
+        }
+    }
+    let end = |sign: i32| end_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
+    morphed_height(sampled, midpoint(end(-1), end(1)), instance.morph)
+}
+
+/// Height of the end of a coarser edge: inside the mesh it stays, on a side it may be on its own way.
+fn end_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
+    let height = if on_edge(instance, turned) { edge_height } else { sampled_height };
+    height(field, frame, instance, turned)
+}
+
+/// Height of a turned vertex on a side of the mesh. It goes to the midpoint of its neighbours along the side,
+/// so that both meshes of a side agree on it. A mesh's corners stay: no level within reach lacks them.
+fn edge_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
+    let upright = turned[0] == 0 || turned[0] == instance.cells as i32;
+    let (along, across) = if upright { (turned[1], turned[0]) } else { (turned[0], turned[1]) };
+    let side = usize::from(!upright) + if across == 0 { 0 } else { 2 };
+    let further = 1 - ((along >> instance.level) & 1);
+    let weight = (instance.edge_morph[side] - further as f32).clamp(0.0, 1.0);
+    let step = 1 << (instance.level as i32 + further);
+    let sampled = sampled_height(field, frame, instance, turned);
+    if weight == 0.0 || along & step == 0 {
+        return sampled;
+    }
+    let apart = if upright { [0, step] } else { [step, 0] };
+    let end = |sign: i32| sampled_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
+    morphed_height(sampled, midpoint(end(-1), end(1)), weight)
+}
+
+fn sampled_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
+    let [x, z] = lattice_position(frame, instance, turned);
+    field.height(x as u32, z as u32)
+}
+
+fn on_edge(instance: &Instance, turned: [i32; 2]) -> bool {
+    turned.iter().any(|&n| n == 0 || n == instance.cells as i32)
+}
+
+fn midpoint(a: f32, b: f32) -> f32 {
+    (a + b) * 0.5
 }
 
 /// Position relative to the eye in metres, world axes, of a lattice position and height.

@@ -75,16 +75,7 @@ impl Pipelines {
         source: Source,
         topology: Topology,
     ) -> Result<vk::Pipeline> {
-        let flag = u32::from;
-        let constants = Constants::new(&[
-            flag(plan.coded),
-            flag(plan.tiled),
-            plan.page_shift,
-            flag(plan.holes),
-            flag(plan.fog),
-            plan.colour as u32,
-            flag(plan.filtered),
-        ]);
+        let constants = Constants::of(plan);
         let (vertex, stride, attributes) = vertex_input(source);
         let bindings = [
             vk::VertexInputBindingDescription::default().binding(0).stride(stride),
@@ -215,6 +206,7 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
     const PAIR: vk::Format = vk::Format::R32G32_SINT;
     const UINT: vk::Format = vk::Format::R32_UINT;
     const FLOAT: vk::Format = vk::Format::R32_SFLOAT;
+    const SIDES: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
     let (shader, stride, vertex) = match source {
         Source::Lattice => {
             ("lattice.vert", size_of::<LatticeVertex>(), vec![(0, PAIR, offset_of!(LatticeVertex, position))])
@@ -230,7 +222,7 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
             ],
         ),
     };
-    let instance = [
+    let mut instance = vec![
         (8, PAIR, offset_of!(Instance, origin)),
         (9, UINT, offset_of!(Instance, cells)),
         (10, UINT, offset_of!(Instance, shift)),
@@ -238,6 +230,11 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
     ];
+    // Explicit vertices have weights of their own.
+    if source == Source::Lattice {
+        instance.push((14, FLOAT, offset_of!(Instance, morph)));
+        instance.push((15, SIDES, offset_of!(Instance, edge_morph)));
+    }
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (shader, stride as u32, attributes)
 }

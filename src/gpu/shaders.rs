@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
+use crate::plan::ScenePlan;
 
 /// File name of the source and SPIR-V of every shader (made by build.rs).
 pub const SHADERS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -41,6 +42,21 @@ impl Constants {
             data: values.iter().flat_map(|v| v.to_ne_bytes()).collect(),
             entries: (0..values.len() as u32).map(entry).collect(),
         }
+    }
+
+    /// What a scene's shaders leave out, in the order of their `constant_id`s.
+    pub fn of(plan: &ScenePlan) -> Self {
+        let flag = u32::from;
+        Self::new(&[
+            flag(plan.coded),
+            flag(plan.tiled),
+            plan.page_shift,
+            flag(plan.holes),
+            flag(plan.fog),
+            plan.colour as u32,
+            flag(plan.filtered),
+            flag(plan.morph),
+        ])
     }
 
     /// The description for a pipeline stage.

@@ -44,7 +44,7 @@ pub fn positions(
     input.write(0, bytemuck::cast_slice(queries));
     let bytes = queries.len() * size_of::<[f32; 3]>();
     let output = Buffer::new(gpu, "answers", bytes as u64, storage, MemoryLocation::GpuToCpu)?;
-    let constants = Constants::new(&[u32::from(plan.coded), u32::from(plan.tiled), plan.page_shift]);
+    let constants = Constants::of(plan);
     // SAFETY: everything bound lives until `once` has waited; what is made here is destroyed after it.
     unsafe {
         let kinds = [

@@ -27,6 +27,11 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
+    /// Whether its lattice vertices morph ([`Instance::morph`](crate::draw::Instance)).
+    fn morphs(&self) -> bool {
+        false
+    }
+
     /// What is worth knowing about the data it prepared: name, value, unit.
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
         Vec::new()

@@ -58,7 +58,7 @@ fn shoot_planned(
 
 /// The picture of a field with the default look.
 fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Shot {
-    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap();
+    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_morph(technique.morphs());
     shoot_planned(gpu, field, &plan, technique, view)
 }
 

@@ -25,6 +25,8 @@ fn forced_features_show_the_same_picture() {
         let same = |name: &str, forced: ScenePlan| assert_eq!(shoot(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
+        // Nobody says how far.
+        same("morphing", ScenePlan { morph: true, ..plan.clone() });
         // The look's density is 0.
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame};
-use cuesta::draw::place::{lattice_position, morphed_height, relative_position};
+use cuesta::draw::place::{lattice_height, lattice_position, morphed_height, relative_position, turned_position};
 use cuesta::draw::{DrawList, Instance};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
@@ -12,16 +12,20 @@ use cuesta::plan::{Look, ScenePlan};
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, and explicit vertices with morph weights.
-fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View) -> Vec<Query> {
+/// Every vertex of every third instance that a technique draws, with made-up morph weights if they are to morph,
+/// and explicit vertices with weights of their own.
+fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> Vec<Query> {
     let mut geomipmap = technique(field, "geomipmap", &["block=17"]);
     let mut list = DrawList::default();
     geomipmap.select(frame_view, &mut list);
     let lattice = &geomipmap.resident().lattice;
-    let lattice_queries = list.instances.iter().step_by(3).flat_map(|instance| {
-        lattice.iter().map(|v| Query {
+    let lattice_queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+        let weight = |by: f32| f32::from(k) * by % 1.0;
+        let edge_morph = [2.0 * weight(0.61), weight(0.27), 2.0 * weight(0.83), 1.0 + weight(0.44)];
+        let morphing = Instance { morph: weight(0.37), edge_morph, ..*instance };
+        lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
-            instance: *instance,
+            instance: if morph { morphing } else { *instance },
             explicit_height: 0,
         })
     });
@@ -39,21 +43,27 @@ fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View) -> Vec<Query> {
 }
 
 fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
-    let at = lattice_position(frame, &query.instance, query.vertex.position);
     let vertex = &query.vertex;
+    let turned = turned_position(&query.instance, vertex.position);
     let height = match query.explicit_height {
-        0 => field.height(at[0] as u32, at[1] as u32),
+        0 => lattice_height(field, frame, &query.instance, turned),
         _ => morphed_height(vertex.height, vertex.target, vertex.morph),
     };
-    relative_position(frame, at, height)
+    relative_position(frame, lattice_position(frame, &query.instance, turned), height)
 }
 
 fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
+    for morph in [false, true] {
+        compare_morph(gpu, name, field, page_shift, morph);
+    }
+}
+
+fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: bool) {
     let view = aslant(field, [320, 200], 2.0);
     let frame = Frame::placing(field, &view);
-    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap();
+    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_morph(morph);
     plan.page_shift = page_shift;
-    let queries = queries(field, &view);
+    let queries = queries(field, &view, morph);
     let device = twin::positions(gpu, &plan, field, &frame, &queries).unwrap();
     for (query, there) in queries.iter().zip(device) {
         let here = on_the_cpu(field, &frame, query);

@@ -3,9 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::mesh;
+use super::measure::{Block, Shape};
 use crate::height::Field;
-use crate::height::surface::{self, Corner, Triangle};
 use crate::view::{Aabb, Containment, Frustum};
 
 /// All blocks of a field, and the quadtree over them.
@@ -16,7 +15,8 @@ pub struct Blocks {
     pub levels: u32,
     /// Blocks along (x, z).
     pub count: [u32; 2],
-    /// ε by block, then level, metres: saturated, and true for every border mask.
+    /// ε by block, then level, metres: saturated, and true for every border mask and, if blocks morph, for all
+    /// that is drawn on the way from the level before.
     errors: Vec<f32>,
     /// Range of heights, from the blocks (level 0) up to one node; `None` where there is no land at all.
     ranges: Vec<Level>,
@@ -32,16 +32,16 @@ struct Level {
 }
 
 impl Blocks {
-    /// Measures a field.
-    pub fn new(field: &Field, cells: i32) -> Self {
+    /// Measures a field whose blocks morph, or do not.
+    pub fn new(field: &Field, cells: i32, morph: bool) -> Self {
         let levels = cells.ilog2() + 1;
         let count = field.size().map(|n| (n - 1).div_ceil(cells as u32));
-        let patterns: Vec<_> = (0..levels).map(|level| pattern(cells, level)).collect();
+        let shapes: Vec<_> = (0..levels).map(|level| Shape::up_to(cells, level, morph)).collect();
         let (ranges, errors): (Vec<_>, Vec<_>) = (0..count[0] * count[1])
             .into_par_iter()
             .map(|k| {
-                let block = Block { field, cells, at: [k % count[0], k / count[0]].map(|n| n as i32) };
-                (block.range(), block.errors(&patterns))
+                let block = Block::new(field, cells, [k % count[0], k / count[0]].map(|n| n as i32));
+                (block.range_of_land(), block.errors(&shapes))
             })
             .unzip();
         let mut tree = vec![Level { count, ranges }];
@@ -58,6 +58,12 @@ impl Blocks {
             origin: field.origin,
             last: field.size().map(|n| n - 1),
         }
+    }
+
+    /// Whether a block sticks out of the field.
+    pub fn is_partial(&self, block: usize) -> bool {
+        let at = [block as u32 % self.count[0], block as u32 / self.count[0]];
+        (0..2).any(|k| (at[k] + 1) * self.cells as u32 > self.last[k])
     }
 
     /// ε of a block by level, metres.
@@ -119,71 +125,4 @@ impl Level {
         let ranges = (0..count[1]).flat_map(|j| (0..count[0]).map(move |i| node(i, j))).collect();
         Level { count, ranges }
     }
-}
-
-/// Every triangle that a block may draw at a level and that may be off the samples, whatever its mask: a border
-/// triangle depends on one side only, so the masks with no side and with all sides have them all. At the finest
-/// level only stitched borders are off.
-fn pattern(cells: i32, level: u32) -> Vec<[[i32; 2]; 3]> {
-    let n = cells >> level;
-    let stitched = if n > 1 { mesh::border(n, 15) } else { Vec::new() };
-    if level == 0 { stitched } else { [mesh::centre(n), mesh::border(n, 0), stitched].concat() }
-}
-
-/// One block while it is measured.
-struct Block<'a> {
-    field: &'a Field,
-    cells: i32,
-    at: [i32; 2],
-}
-
-impl Block<'_> {
-    fn last(&self) -> [i32; 2] {
-        self.field.size().map(|n| n as i32 - 1)
-    }
-
-    /// Range of all heights, those under holes included, or `None` if no triangle of the finest level has
-    /// data at its three corners.
-    fn range(&self) -> Option<[f32; 2]> {
-        let first = self.at.map(|n| n * self.cells);
-        let last = [0, 1].map(|k| (first[k] + self.cells).min(self.last()[k]));
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for j in first[1]..=last[1] {
-            for i in first[0]..=last[0] {
-                let y = self.field.height(i as u32, j as u32);
-                (low, high) = (low.min(y), high.max(y));
-            }
-        }
-        surface::has_land(self.field, first, last).then_some([low, high])
-    }
-
-    /// ε by level, saturated.
-    fn errors(&self, patterns: &[Vec<[[i32; 2]; 3]>]) -> Vec<f32> {
-        let mut saturated = 0.0f32;
-        patterns
-            .iter()
-            .enumerate()
-            .map(|(level, pattern)| {
-                let level_error = pattern.iter().map(|t| self.deviation(level, t)).fold(0.0, f32::max);
-                saturated = saturated.max(level_error);
-                saturated
-            })
-            .collect()
-    }
-
-    fn deviation(&self, level: usize, triangle: &[[i32; 2]; 3]) -> f32 {
-        let turn = coarsest_turn(self.at, self.cells >> level);
-        let corners: Triangle = triangle.map(|[x, z]| {
-            let [x, z] = if turn == 1 { [(self.cells >> level) - z, x] } else { [x, z] };
-            let at = |k: usize, n: i32| (self.at[k] * self.cells + (n << level)).min(self.last()[k]);
-            let (x, z) = (at(0, x), at(1, z));
-            Corner { x, z, y: self.field.height(x as u32, z as u32) }
-        });
-        if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(self.field, &corners) }
-    }
-}
-
-/// A block of a single cell takes its diagonal from its own parity among the blocks.
-pub fn coarsest_turn(at: [i32; 2], n: i32) -> u32 {
-    u32::from(n == 1 && (at[0] + at[1]) & 1 == 1)
 }

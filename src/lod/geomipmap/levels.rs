@@ -1,5 +1,6 @@
 //! Which level a block takes in a view, and how neighbours are brought within one level of each other.
 
+use super::MORPH_RATIO;
 use super::blocks::Blocks;
 use crate::view::View;
 
@@ -15,47 +16,74 @@ pub enum Distance {
     Exponential(f64),
 }
 
+/// One level as a fixed-point number: the fraction is the morph weight to the next level. Integers, so that sums
+/// are exact; 16 bits, so that weights are exact in f32 and their steps cannot be seen.
+pub const ONE: u32 = 1 << 16;
+
 impl Distance {
-    fn level(self, blocks: &Blocks, view: &View, block: usize) -> u8 {
+    /// What must reach 1 before a block gives up `level − 1` for `level`. It falls with the level.
+    fn ratio(self, blocks: &Blocks, view: &View, block: usize) -> impl Fn(u32) -> f64 {
         let bounds = blocks.bounds(block);
-        let coarsest = blocks.levels - 1;
-        let level = match self {
-            Distance::Error => {
-                let allowed = view.allowed_error(&bounds);
-                let fits = |&&error: &&f32| f64::from(error) <= allowed;
-                blocks.errors(block).iter().take_while(fits).count().max(1) as u32 - 1
-            }
-            Distance::Linear(base) => (view.eye.distance((bounds.min + bounds.max) / 2.0) / base) as u32,
-            Distance::Exponential(base) => {
-                let ratio = view.eye.distance((bounds.min + bounds.max) / 2.0) / base;
-                (0..coarsest).take_while(|&level| ratio >= f64::from(1u32 << level)).count() as u32
-            }
-        };
-        level.min(coarsest) as u8
+        let distance = view.eye.distance((bounds.min + bounds.max) / 2.0);
+        let allowed = view.allowed_error(&bounds);
+        move |level| match self {
+            // Not 0 / 0.
+            Distance::Error => allowed / f64::from(blocks.errors(block)[level as usize].max(f32::MIN_POSITIVE)),
+            Distance::Linear(base) => distance / base - f64::from(level - 1),
+            Distance::Exponential(base) => distance / base / f64::from(1u32 << (level - 1)),
+        }
     }
 
-    /// The level of every block, neighbours within one level of each other.
-    pub fn levels(self, blocks: &Blocks, view: &View, levels: &mut Vec<u8>) {
+    /// From which to which ratio a block morphs.
+    fn band(self) -> [f64; 2] {
+        match self {
+            Distance::Error => [1.0, MORPH_RATIO],
+            // The last 30 % of the way between two levels; exponential ones begin at half the ratio.
+            Distance::Linear(_) => [0.7, 1.0],
+            Distance::Exponential(_) => [0.85, 1.0],
+        }
+    }
+
+    /// Whole levels: those whose ratio is reached.
+    fn level(self, blocks: &Blocks, view: &View, block: usize) -> u32 {
+        let ratio = self.ratio(blocks, view, block);
+        ONE * (1..blocks.levels).take_while(|&level| ratio(level) >= 1.0).count() as u32
+    }
+
+    /// The sum of what each level has of its band: continuous, however the bands overlap. As the ratio falls
+    /// with the level, the sum exceeds a level only where the band of the next one has begun, and with it the
+    /// bound is kept.
+    fn morphing_level(self, blocks: &Blocks, view: &View, block: usize) -> u32 {
+        let ratio = self.ratio(blocks, view, block);
+        let [begin, end] = self.band();
+        let part = |level| ((ratio(level) - begin) / (end - begin)).clamp(0.0, 1.0);
+        let sum: f64 = (1..blocks.levels).map(part).take_while(|part| *part > 0.0).sum();
+        (sum * f64::from(ONE)) as u32
+    }
+
+    /// The fixed-point level of every block, neighbours within one level of each other.
+    pub fn levels(self, blocks: &Blocks, view: &View, morph: bool, levels: &mut Vec<u32>) {
         let [w, h] = blocks.count.map(|n| n as usize);
+        let level = if morph { Self::morphing_level } else { Self::level };
         levels.clear();
-        levels.extend((0..w * h).map(|block| self.level(blocks, view, block)));
+        levels.extend((0..w * h).map(|block| level(self, blocks, view, block)));
         restrict(levels, w, h);
     }
 }
 
 /// Refines levels until neighbours differ by at most one: two sweeps give each block the smallest of
-/// (level + distance in blocks) over all others.
-pub fn restrict(levels: &mut [u8], w: usize, h: usize) {
+/// (level + distance in blocks) over all others. That is continuous in all of them, and so are morph weights.
+pub fn restrict(levels: &mut [u32], w: usize, h: usize) {
     for k in 0..w * h {
         let (i, j) = (k % w, k / w);
-        let west = if i > 0 { levels[k - 1] + 1 } else { u8::MAX };
-        let north = if j > 0 { levels[k - w] + 1 } else { u8::MAX };
+        let west = if i > 0 { levels[k - 1] + ONE } else { u32::MAX };
+        let north = if j > 0 { levels[k - w] + ONE } else { u32::MAX };
         levels[k] = levels[k].min(west).min(north);
     }
     for k in (0..w * h).rev() {
         let (i, j) = (k % w, k / w);
-        let east = if i + 1 < w { levels[k + 1] + 1 } else { u8::MAX };
-        let south = if j + 1 < h { levels[k + w] + 1 } else { u8::MAX };
+        let east = if i + 1 < w { levels[k + 1] + ONE } else { u32::MAX };
+        let south = if j + 1 < h { levels[k + w] + ONE } else { u32::MAX };
         levels[k] = levels[k].min(east).min(south);
     }
 }
@@ -73,14 +101,14 @@ mod tests {
             seed >> 24
         };
         for _ in 0..50 {
-            let wanted: Vec<u8> = (0..w * h).map(|_| if random() < 20 { 0 } else { 7 }).collect();
+            let wanted: Vec<u32> = (0..w * h).map(|_| if random() < 20 { random() * 99 } else { 7 * ONE }).collect();
             let mut levels = wanted.clone();
             restrict(&mut levels, w, h);
             for (k, &level) in levels.iter().enumerate() {
                 let expected = (0..w * h)
-                    .map(|o| usize::from(wanted[o]) + (k % w).abs_diff(o % w) + (k / w).abs_diff(o / w))
+                    .map(|o| wanted[o] + ONE * ((k % w).abs_diff(o % w) + (k / w).abs_diff(o / w)) as u32)
                     .min();
-                assert_eq!(usize::from(level), expected.unwrap());
+                assert_eq!(level, expected.unwrap());
             }
         }
     }

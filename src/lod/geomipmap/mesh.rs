@@ -105,6 +105,12 @@ pub fn centre(n: i32) -> Vec<[[i32; 2]; 3]> {
     cells(n).filter(|&(i, j)| !on_border(i, j, n)).flat_map(|(i, j)| rtin::cell(i, j)).collect()
 }
 
+/// Triangles of the cells next to the border cells.
+pub fn inner_border(n: i32) -> Vec<[[i32; 2]; 3]> {
+    let next = |(i, j): &(i32, i32)| (1..n - 1).contains(i) && (1..n - 1).contains(j) && on_border(i - 1, j - 1, n - 2);
+    cells(n).filter(next).flat_map(|(i, j)| rtin::cell(i, j)).collect()
+}
+
 /// Triangles of the border cells: on a side of the mask every second vertex falls onto the one before it,
 /// and what collapses is dropped.
 pub fn border(n: i32, mask: u8) -> Vec<[[i32; 2]; 3]> {

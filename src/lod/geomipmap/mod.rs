@@ -10,6 +10,8 @@
 //! - partial blocks at the far edges are drawn, not dropped: what sticks out collapses onto the edge;
 //! - the six border classes of its outlook are the default, its sixteen masks an option; so are its levels by
 //!   distance beside levels by error;
+//! - with `morph=on` its outlook's vertex morphing too: levels are continuous numbers (see [`levels`]), a side
+//!   has the greater of its two blocks', and vertices that the next level lacks go to their places in it;
 //! - blocks are culled by a quadtree and drawn instanced, all in one indirect call; `draw-per-block` records
 //!   its two draws for each block.
 //!
@@ -17,17 +19,22 @@
 
 pub mod blocks;
 pub mod levels;
+mod measure;
 pub mod mesh;
 
 use std::sync::Arc;
 
 use self::blocks::Blocks;
-use self::levels::Distance;
+use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
 use crate::height::Field;
 use crate::view::View;
+
+/// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
+/// has left it at this many times that error: a longer way draws the finer level for longer, a shorter one is seen.
+const MORPH_RATIO: f64 = 1.3;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -60,6 +67,12 @@ pub const ENTRY: Entry = Entry {
             default: "6",
             about: "border masks held: six turned classes, or all sixteen",
         },
+        Setting {
+            key: "morph",
+            values: Values::Words(&["off", "on"]),
+            default: "off",
+            about: "whether a level goes over into the next, or changes at once",
+        },
     ],
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
 };
@@ -69,11 +82,12 @@ struct GeoMipMap {
     mesh: BlockMesh,
     masks: Masks,
     distance: Distance,
+    morph: bool,
     draw_per_block: bool,
     /// Bytes of indices with six classes and with sixteen masks.
     index_bytes: [usize; 2],
-    /// Level of every block in the current view.
-    levels: Vec<u8>,
+    /// Level of every block in the current view, fixed-point.
+    levels: Vec<u32>,
     /// The blocks in sight, with the key that sorts them into draws.
     visible: Vec<(u32, u32)>,
 }
@@ -81,11 +95,12 @@ struct GeoMipMap {
 impl GeoMipMap {
     fn new(field: &Arc<Field>, settings: &Settings) -> Self {
         let cells = settings.number("block") as i32 - 1;
+        let morph = settings.word("morph") == "on";
         let base = settings.number("base") * field.spacing[0].max(field.spacing[1]);
         let masks = if settings.word("masks") == "16" { Masks::Sixteen } else { Masks::Six };
         let bytes = |masks| size_of_val(BlockMesh::new(cells, masks).geometry.indices.as_slice());
         Self {
-            blocks: Blocks::new(field, cells),
+            blocks: Blocks::new(field, cells, morph),
             mesh: BlockMesh::new(cells, masks),
             masks,
             distance: match settings.word("distance") {
@@ -93,6 +108,7 @@ impl GeoMipMap {
                 "exponential" => Distance::Exponential(base),
                 _ => Distance::Error,
             },
+            morph,
             draw_per_block: settings.variant() == Some("draw-per-block"),
             index_bytes: [bytes(Masks::Six), bytes(Masks::Sixteen)],
             levels: Vec::new(),
@@ -100,31 +116,60 @@ impl GeoMipMap {
         }
     }
 
-    /// The sides on which a block meets a coarser one.
-    fn mask(&self, block: usize) -> u8 {
+    /// The whole level that a block is drawn at.
+    fn level(&self, block: usize) -> u32 {
+        self.levels[block] / ONE
+    }
+
+    /// The blocks to the left, top, right and bottom; at the field's border the block itself.
+    fn neighbours(&self, block: usize) -> [usize; 4] {
         let [w, h] = self.blocks.count.map(|n| n as usize);
         let (i, j) = (block % w, block / w);
-        let coarser = |exists: bool, neighbour: usize, bit: u8| {
-            if exists && self.levels[neighbour] > self.levels[block] { bit } else { 0 }
+        let inside = |exists: bool, neighbour: usize| if exists { neighbour } else { block };
+        [
+            inside(i > 0, block.wrapping_sub(1)),
+            inside(j > 0, block.wrapping_sub(w)),
+            inside(i + 1 < w, block + 1),
+            inside(j + 1 < h, block + w),
+        ]
+    }
+
+    /// The sides on which a block meets a coarser one.
+    fn mask(&self, block: usize) -> u8 {
+        let bits = self.neighbours(block).into_iter().zip([side::LEFT, side::TOP, side::RIGHT, side::BOTTOM]);
+        bits.filter(|&(neighbour, _)| self.level(neighbour) > self.level(block)).map(|(_, bit)| bit).sum()
+    }
+
+    /// How far beyond a block's level its inside and its sides are. A side has the greater level of its two
+    /// blocks: it is where either of them goes over, and the other one's bound covers it, being at most a level
+    /// behind. Where blocks stick out of the field midpoints are none, so the inside of such a block and a side
+    /// between two of them stay.
+    fn weights(&self, block: usize) -> (f32, [f32; 4]) {
+        let base = self.level(block) * ONE;
+        let partial = |block| self.blocks.is_partial(block);
+        let weight = |level: u32, stays: bool| {
+            let level = if stays { level / ONE * ONE } else { level };
+            (level - base) as f32 / ONE as f32
         };
-        coarser(i > 0, block.wrapping_sub(1), side::LEFT)
-            | coarser(j > 0, block.wrapping_sub(w), side::TOP)
-            | coarser(i + 1 < w, block + 1, side::RIGHT)
-            | coarser(j + 1 < h, block + w, side::BOTTOM)
+        let edge = |other: usize| weight(self.levels[block].max(self.levels[other]), partial(block) && partial(other));
+        (weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
     }
 
     fn instance(&self, block: usize) -> Instance {
         let (i, j) = (block as u32 % self.blocks.count[0], block as u32 / self.blocks.count[0]);
-        let level = self.levels[block];
+        let level = self.level(block);
         let (_, turns) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
+        let (morph, edge_morph) = if self.morph { self.weights(block) } else { Default::default() };
         Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
             shift: 0,
-            turns: turns.max(blocks::coarsest_turn(at, self.blocks.cells >> level)),
-            level: u32::from(level),
+            turns: turns.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
+            level,
             batch: 0,
+            morph,
+            edge_morph,
         }
     }
 
@@ -134,7 +179,7 @@ impl GeoMipMap {
         visible.clear();
         self.blocks.visit_visible(&view.frustum(), &mut |block| {
             let (border, _) = self.masks.border(self.mask(block));
-            let key = u32::from(self.levels[block]) * self.masks.count() as u32 + border as u32;
+            let key = self.level(block) * self.masks.count() as u32 + border as u32;
             visible.push((key, block as u32));
         });
         visible.sort_unstable();
@@ -196,7 +241,7 @@ impl Technique for GeoMipMap {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.distance.levels(&self.blocks, view, &mut self.levels);
+        self.distance.levels(&self.blocks, view, self.morph, &mut self.levels);
         self.fill_instances(view, list);
         if self.draw_per_block {
             self.draw_per_block(list);
@@ -207,6 +252,10 @@ impl Technique for GeoMipMap {
 
     fn keeps_tolerance(&self) -> bool {
         self.distance == Distance::Error
+    }
+
+    fn morphs(&self) -> bool {
+        self.morph
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

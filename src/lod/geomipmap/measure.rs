@@ -1,0 +1,206 @@
+//! How far the shapes of a block are from the samples.
+//!
+//! A block that morphs from level l to l + 1 has a weight v inside and one on each side, e, which goes from 0
+//! (level l) over 1 (level l + 1) to 2 (level l + 2). A vertex moves on a straight line with the one weight it
+//! depends on, or, inside next to a side, with v and with the e of the sides that its target's ends lie on. So
+//! above any sample the drawn height is affine in each weight while the others stay, between whole numbers, and
+//! the largest distance from the sample is at a corner of that cube: v in {0, 1}, each e in {0, 1, 2}. The
+//! corners are shapes, and the shapes are measured. As a triangle depends on one side only (at a block's corners
+//! too, where cells have their diagonals from that corner, at both levels), all sides are measured at the same e.
+//! Most corners are what a level draws anyway, stitched or not; new are v = 0 with e = 2, level l inside and two
+//! levels coarser on the sides, and v = 1 with e = 0, level l + 1 inside and level l on the sides.
+
+use super::mesh;
+use crate::draw::Instance;
+use crate::draw::layout::Frame;
+use crate::draw::place::{lattice_height, lattice_position, turned_position};
+use crate::height::Field;
+use crate::height::surface::{self, Corner, Triangle};
+
+/// Heights between two shapes are rounded: a drawn height is off by at most 12 half-ulps of the largest height
+/// around, six for each of the two steps of `draw::place::lattice_height`.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// Triangles of a block at a level and at whole morph weights.
+pub struct Shape {
+    level: u32,
+    morph: f32,
+    edge_morph: [f32; 4],
+    triangles: Vec<[[i32; 2]; 3]>,
+}
+
+impl Shape {
+    /// All that a block may draw at a level, and on the way to it from the one before if it morphs, as far as it
+    /// may be off the samples.
+    pub fn up_to(cells: i32, level: u32, morph: bool) -> Vec<Shape> {
+        let still = Shape { level, morph: 0.0, edge_morph: [0.0; 4], triangles: pattern(cells, level) };
+        let way = if morph && level > 0 { Self::on_the_way(cells, level - 1) } else { Vec::new() };
+        std::iter::once(still).chain(way).collect()
+    }
+
+    /// The new corners of the module's text from `level` to the next.
+    fn on_the_way(cells: i32, level: u32) -> Vec<Shape> {
+        let n = cells >> level;
+        let shape = |(morph, side): (f32, f32)| {
+            let mask = if side < 1.0 { 0 } else { 15 };
+            let triangles = [mesh::border(n, mask), mesh::inner_border(n)].concat();
+            Shape { level, morph, edge_morph: [side; 4], triangles }
+        };
+        // No level is two levels coarser than that of two cells.
+        let corners = [(1.0, 0.0), (0.0, 2.0)].into_iter().filter(|(_, side)| *side < 2.0 || n > 2);
+        corners.map(shape).collect()
+    }
+}
+
+/// Every triangle that a block may draw at a level and that may be off the samples, whatever its mask: a border
+/// triangle depends on one side only, so the masks with no side and with all sides have them all. At the finest
+/// level only stitched borders are off.
+fn pattern(cells: i32, level: u32) -> Vec<[[i32; 2]; 3]> {
+    let n = cells >> level;
+    let stitched = if n > 1 { mesh::border(n, 15) } else { Vec::new() };
+    if level == 0 { stitched } else { [mesh::centre(n), mesh::border(n, 0), stitched].concat() }
+}
+
+/// One block while it is measured.
+pub struct Block<'a> {
+    field: &'a Field,
+    frame: Frame,
+    cells: i32,
+    at: [i32; 2],
+}
+
+impl<'a> Block<'a> {
+    /// The block at a place among the blocks.
+    pub fn new(field: &'a Field, cells: i32, at: [i32; 2]) -> Self {
+        let last = field.size().map(|n| n as i32 - 1);
+        Self { field, frame: Frame { last, ..Frame::default() }, cells, at }
+    }
+
+    /// First and last sample.
+    fn ends(&self) -> [[i32; 2]; 2] {
+        let first = self.at.map(|n| n * self.cells);
+        [first, [0, 1].map(|k| (first[k] + self.cells).min(self.frame.last[k]))]
+    }
+
+    /// Whether it sticks out of the field.
+    fn is_partial(&self) -> bool {
+        (0..2).any(|k| (self.at[k] + 1) * self.cells > self.frame.last[k])
+    }
+
+    /// Range of all heights, those under holes included.
+    fn range(&self) -> [f32; 2] {
+        let [first, last] = self.ends();
+        let rows = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| (i, j)));
+        rows.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], (i, j)| {
+            let y = self.field.height(i as u32, j as u32);
+            [low.min(y), high.max(y)]
+        })
+    }
+
+    /// The range, or `None` if no triangle of the finest level has data at its three corners.
+    pub fn range_of_land(&self) -> Option<[f32; 2]> {
+        let [first, last] = self.ends();
+        surface::has_land(self.field, first, last).then(|| self.range())
+    }
+
+    /// ε by level, saturated.
+    pub fn errors(&self, shapes: &[Vec<Shape>]) -> Vec<f32> {
+        let mut saturated = 0.0f32;
+        let error = |shapes: &Vec<Shape>| {
+            saturated = shapes.iter().map(|shape| self.error(shape)).fold(saturated, f32::max);
+            saturated
+        };
+        let mut errors: Vec<f32> = shapes.iter().map(error).collect();
+        if shapes.iter().any(|shapes| shapes.len() > 1) {
+            let [low, high] = self.range();
+            let rounding = low.abs().max(high.abs()) * ROUNDING;
+            // Where nothing is off the samples, nothing moves.
+            errors.iter_mut().filter(|error| **error > 0.0).for_each(|error| *error += rounding);
+        }
+        errors
+    }
+
+    fn error(&self, shape: &Shape) -> f32 {
+        // The inside of a block that sticks out does not morph.
+        if shape.morph > 0.0 && self.is_partial() {
+            return 0.0;
+        }
+        let instance = Instance {
+            origin: self.at.map(|n| n * self.cells),
+            cells: self.cells as u32,
+            turns: coarsest_turn(self.at, self.cells >> shape.level),
+            level: shape.level,
+            morph: shape.morph,
+            edge_morph: shape.edge_morph,
+            ..Instance::default()
+        };
+        shape.triangles.iter().map(|t| self.deviation(&instance, t)).fold(0.0, f32::max)
+    }
+
+    fn deviation(&self, instance: &Instance, triangle: &[[i32; 2]; 3]) -> f32 {
+        let corners: Triangle = triangle.map(|at| {
+            let turned = turned_position(instance, at.map(|n| n << instance.level));
+            let [x, z] = lattice_position(&self.frame, instance, turned);
+            Corner { x, z, y: lattice_height(self.field, &self.frame, instance, turned) }
+        });
+        if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(self.field, &corners) }
+    }
+}
+
+/// A block of a single cell takes its diagonal from its own parity among the blocks.
+pub fn coarsest_turn(at: [i32; 2], n: i32) -> u32 {
+    u32::from(n == 1 && (at[0] + at[1]) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    const CELLS: i32 = 16;
+
+    /// 2 × 2 blocks, rough only near a column of samples, or near one sample.
+    fn rough_near(x: u32, z: Option<u32>, random: &mut impl FnMut() -> f32) -> Field {
+        let size = 2 * CELLS as u32 + 1;
+        let near = |k: u32| (k % size).abs_diff(x) < 3 && z.is_none_or(|z| (k / size).abs_diff(z) < 3);
+        let heights = (0..size * size).map(|k| if near(k) { 100.0 * random() } else { 0.0 });
+        Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
+    }
+
+    /// ε of everything a block draws at given weights.
+    fn drawn_error(block: &Block, level: u32, morph: f32, edge_morph: [f32; 4]) -> f32 {
+        let (n, mask) = (CELLS >> level, (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum());
+        let triangles = [mesh::border(n, mask), mesh::centre(n)].concat();
+        block.error(&Shape { level, morph, edge_morph, triangles })
+    }
+
+    #[test]
+    fn no_weights_between_the_corners_exceed_the_error() {
+        let mut seed = 3u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        let (mut beyond_still, mut closest) = (0, 0.0f32);
+        for k in 0..132 {
+            let z = (k >= 66).then_some(14 + k / 7 % 5);
+            let field = rough_near(k % 33, z, &mut random);
+            let block = Block::new(&field, CELLS, [(k / 2 % 2) as i32, (k % 2) as i32]);
+            let errors =
+                |morph| block.errors(&(0..5).map(|level| Shape::up_to(CELLS, level, morph)).collect::<Vec<_>>());
+            let (errors, still) = (errors(true), errors(false));
+            for (level, draw) in (0..4).flat_map(|level| (0..20).map(move |draw| (level, draw))) {
+                let furthest = if level == 3 { 1.0 } else { 2.0 };
+                // Half of them at the corners.
+                let mut weight = |most: f32| if draw < 10 { most * random() } else { (most * random()).round() };
+                let (v, e) = (weight(1.0), [0; 4].map(|_| weight(furthest)));
+                let (error, bound) = (drawn_error(&block, level, v, e), errors[level as usize + 1]);
+                assert!(error <= bound, "level {level}, {v} inside, sides {e:?}: {error} m of {bound} m");
+                beyond_still += usize::from(error > still[level as usize + 1]);
+                closest = closest.max(error / bound.max(f32::MIN_POSITIVE));
+            }
+        }
+        // The shapes on the way are needed, and no more than needed.
+        assert!(beyond_still > 10 && closest > 0.999, "{beyond_still} beyond what levels draw, {closest} of the bound");
+    }
+}

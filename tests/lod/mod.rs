@@ -1,0 +1,30 @@
+//! What single techniques promise beyond the laws of `conformance`.
+
+mod morph;
+
+use std::sync::Arc;
+
+use cuesta::draw::expand;
+use cuesta::draw::layout::Frame;
+use cuesta::draw::{DrawList, Geometry};
+use cuesta::height::{Field, surface};
+use cuesta::lod::{self, Settings, Technique};
+use cuesta::view::View;
+
+/// A technique with settings given as `key=value`.
+fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
+    let entry = lod::find(name).expect("in the table");
+    let pair = |s: &&str| s.split_once('=').map(|(k, v)| (k.to_string(), v.to_string())).expect("key=value");
+    let settings: Vec<_> = settings.iter().map(pair).collect();
+    (entry.build)(Arc::clone(field), &Settings::new(entry, None, &settings).expect("the table's own values"))
+}
+
+/// The drawn height above every sample; not a number where nothing is drawn.
+fn heights(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Vec<f64> {
+    let [w, h] = field.size();
+    let mut heights = vec![f64::NAN; (w * h) as usize];
+    expand::visit_triangles(field, &Frame::placing(field, view), resident, list, |drawn| {
+        surface::visit_samples(&drawn.corners, |x, z, y| heights[(z * w + x) as usize] = y);
+    });
+    heights
+}

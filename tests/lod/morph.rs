@@ -1,0 +1,111 @@
+//! Geomipmap's morphing: it ends where the next level begins, and nothing jumps on the way.
+
+use std::sync::Arc;
+
+use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
+use cuesta::height::{Field, synth};
+use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+
+use super::{heights, technique};
+
+/// Mountains of whole blocks: what sticks out does not morph inside.
+fn land() -> Arc<Field> {
+    let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 5);
+    field.spacing = [20.0, 20.0];
+    Arc::new(field)
+}
+
+fn view(eye: DVec3, target: DVec3, px: f64) -> View {
+    View {
+        eye,
+        world_from_eye: View::looking_along(target - eye),
+        lens: Lens::Perspective { fov_x: 60f64.to_radians() },
+        size: [1280, 720],
+        near: 1.0,
+        tolerance: Tolerance { px, metric: Metric::Certified },
+    }
+}
+
+/// A block of 16 cells at a level, its sides as far beyond the level as said.
+fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph: [f32; 4]) -> DrawList {
+    let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
+    let turns = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
+    let instance = Instance { origin, cells: 16, turns, level, morph, edge_morph, ..Instance::default() };
+    let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
+    let draws = ranges.map(|indices| Draw {
+        source: Source::Lattice,
+        topology: Topology::Triangles,
+        indices: indices.clone(),
+        instances: 0..1,
+    });
+    DrawList { draws: draws.into(), instances: vec![instance], ..DrawList::default() }
+}
+
+#[test]
+fn at_its_end_a_morph_is_the_next_level() {
+    let (field, mesh) = (land(), BlockMesh::new(16, Masks::Sixteen));
+    let anywhere = view(DVec3::ZERO, DVec3::X, 1.0);
+    let surface = |list: &DrawList| heights(&field, &anywhere, &mesh.geometry, list);
+    for origin in [[0, 0], [16, 0], [32, 48], [80, 128]] {
+        for level in 0..4 {
+            // The last level has no sides beyond it.
+            let beyond = if level == 3 { 0.0 } else { 1.0 };
+            for sides in [[0.0; 4], [1.0, 0.25, 0.0, 0.5], [0.75, 0.0, 1.0, 0.125], [0.5; 4]] {
+                let sides = sides.map(|e: f32| e * beyond * 0.9999);
+                let end = surface(&block(&mesh, origin, level, 1.0, sides.map(|e| 1.0 + e)));
+                let next = surface(&block(&mesh, origin, level + 1, 0.0, sides));
+                let largest = (end.iter().zip(&next)).filter(|(a, _)| !a.is_nan()).map(|(a, b)| (a - b).abs());
+                let largest = largest.fold(0.0, |a, b| if b.is_nan() { b } else { f64::max(a, b) });
+                assert!(largest < 2e-3, "level {level} at {origin:?}, {sides:?}: {largest} m");
+            }
+            let start = surface(&block(&mesh, origin, level, 0.0, [0.0; 4]));
+            let end = surface(&block(&mesh, origin, level, 1.0, [1.0; 4]));
+            assert!((start.iter().zip(&end)).any(|(a, b)| (a - b).abs() > 0.1), "it moves");
+        }
+    }
+}
+
+/// The largest displacement on the screen, pixels, by a change of levels alone, along a slow way to the land.
+fn largest_jump(field: &Arc<Field>, settings: &[&str]) -> f64 {
+    let mut technique = technique(field, "geomipmap", settings);
+    let target = field.world_at(128.0, 128.0, 500.0);
+    let mut frame = |k: u32| {
+        // Half a per cent nearer each time.
+        let away = 9000.0 * 0.995f64.powi(k as i32);
+        let view = view(target + DVec3::new(-0.7, 0.5, 0.6) * away, target, 2.0);
+        let mut list = DrawList::default();
+        technique.select(&view, &mut list);
+        (view, heights(field, &view, technique.resident() as &Geometry, &list))
+    };
+    let (mut last, mut largest) = (frame(0).1, 0.0f64);
+    for k in 1..200 {
+        let (view, now) = frame(k);
+        for (n, (a, b)) in (0u32..).zip(last.iter().zip(&now)).filter(|(_, (a, b))| a != b) {
+            let at = |y: f64| field.world_at(f64::from(n % 257), f64::from(n / 257), y);
+            let seen = |y: &f64| !y.is_nan() && view.project(at(*y)).is_some_and(|p| view.in_picture(&p));
+            if seen(a) && seen(b) {
+                largest = largest.max(view.displacement_px(at(*a), at(*b)));
+            }
+        }
+        last = now;
+    }
+    largest
+}
+
+/// Of a tolerance of 2 px.
+const JUMP_PX: f64 = 0.15;
+
+#[test]
+fn on_a_slow_way_nothing_jumps() {
+    let field = land();
+    for distance in ["error", "linear", "exponential"] {
+        let settings = ["block=17", "base=60", &format!("distance={distance}"), "morph=off"];
+        let off = largest_jump(&field, &settings);
+        let on = largest_jump(&field, &[&settings[..3], &["morph=on"]].concat());
+        println!("{distance}: {off:.3} px at once, {on:.3} px morphing");
+        let limit = if distance == "error" { JUMP_PX } else { off / 4.0 };
+        assert!(on < limit && limit < off, "{distance}: {on} px morphing, {off} px at once");
+    }
+}
