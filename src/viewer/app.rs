@@ -181,9 +181,9 @@ impl<'a> App<'a> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let (entry, settings) = &self.session.technique;
         open.window.set_title(&format!("cuesta: preparing {}", entry.name));
-        if let Err(error) = open.stage.set_technique(self.setup, entry, settings) {
+        if let Err(error) = open.stage.set_technique(self.setup, &self.session.look, entry, settings) {
             self.session.tell(format!("{}: {error:#}", entry.name));
-            open.stage.set_technique(self.setup, before.0, &before.1)?;
+            open.stage.set_technique(self.setup, &self.session.look, before.0, &before.1)?;
             self.session.technique = before;
         }
         open.window.set_title(&self.session.title(self.setup));

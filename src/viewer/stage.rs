@@ -64,6 +64,12 @@ pub struct Shown {
     pub copy: Option<image::RgbaImage>,
 }
 
+/// What the scene needs.
+fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Result<ScenePlan> {
+    let plan = ScenePlan::new(&setup.field, look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+    Ok(plan.with_morph(technique.morphs()))
+}
+
 impl Stage {
     /// Makes everything for a window.
     pub fn new(setup: &Setup, instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
@@ -71,9 +77,9 @@ impl Stage {
         let gpu = Gpu::for_window(instance, &setup.choice, |candidate| surface.is_shown_by(candidate))?;
         let swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
         let formats = swapchain.formats();
-        let plan = ScenePlan::new(&setup.field, &setup.look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
         let (entry, settings) = &setup.technique;
         let technique = (entry.build)(Arc::clone(&setup.field), settings);
+        let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         let (resident, limits) = (technique.resident(), technique.limits());
         let statistics = setup.field.statistics();
         Ok(Self {
@@ -96,15 +102,16 @@ impl Stage {
 
     /// Changes the look: pipelines only.
     pub fn set_look(&mut self, setup: &Setup, look: &Look) -> Result<()> {
-        let plan = ScenePlan::new(&setup.field, look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        let plan = plan(&self.gpu, setup, look, self.technique.as_ref())?;
         self.terrain.replan(&plan, self.swapchain.formats())
     }
 
-    /// Changes the technique: its geometry and the slots' room.
-    pub fn set_technique(&mut self, setup: &Setup, entry: &Entry, settings: &Settings) -> Result<()> {
+    /// Changes the technique: its geometry, the slots' room, and pipelines for what it needs.
+    pub fn set_technique(&mut self, setup: &Setup, look: &Look, entry: &Entry, settings: &Settings) -> Result<()> {
         self.technique = (entry.build)(Arc::clone(&setup.field), settings);
         self.list.clear();
-        self.terrain.retarget(self.technique.resident(), self.technique.limits())
+        self.terrain.retarget(self.technique.resident(), self.technique.limits())?;
+        self.set_look(setup, look)
     }
 
     /// The size of the next frame in a window of this size; `None` while it is minimised.
