@@ -149,7 +149,7 @@ impl Recording<'_> {
             }
         }
         let result = record(self);
-        // SAFETY: as above.
+        // SAFETY: the queries begun above are ended in the same command buffer.
         unsafe {
             if counted {
                 self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
@@ -205,7 +205,7 @@ impl Slot {
         let passes = self.scopes.iter().zip(stamps.chunks(2)).map(|(name, t)| (*name, ms(t[0], t[1]))).collect();
         let statistics = if self.has_statistics {
             let mut counts = [[0u64; 3]];
-            // SAFETY: as above.
+            // SAFETY: the frame has ended and wrote this query.
             unsafe { gpu.raw.get_query_pool_results(self.statistics, 0, &mut counts, flags)? };
             Some(counts[0])
         } else {

@@ -168,7 +168,7 @@ impl Pipelines {
             .push_next(&mut rendering);
         // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
         let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-        // SAFETY: as above.
+        // SAFETY: no call uses the modules any more.
         unsafe {
             gpu.raw.destroy_shader_module(vertex, None);
             gpu.raw.destroy_shader_module(fragment, None);
