@@ -1,3 +1,22 @@
 # How shaderc itself is compiled (see .cargo/config.toml): quickly, since it only runs in build.rs.
 set(CMAKE_C_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
 set(CMAKE_CXX_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
+set(SKIP_SPIRV_TOOLS_INSTALL ON CACHE BOOL "")
+set(SHADERC_SKIP_EXECUTABLES ON CACHE BOOL "")
+
+# Once all is declared: leave out what the compiler does not need, and read its largest headers once.
+function(cuesta_trim_shaderc)
+    foreach(unused SPIRV-Tools-shared SPIRV-Tools-reduce SPIRV-Tools-lint SPIRV-Tools-diff SPIRV-Tools-link)
+        if(TARGET ${unused})
+            set_property(TARGET ${unused} PROPERTY EXCLUDE_FROM_ALL ON)
+        endif()
+    endforeach()
+    if(TARGET SPIRV-Tools-opt)
+        target_precompile_headers(SPIRV-Tools-opt PRIVATE
+            "$<$<COMPILE_LANGUAGE:CXX>:${CMAKE_SOURCE_DIR}/spirv-tools/source/opt/pch_source_opt.h>")
+    endif()
+endfunction()
+
+if(CMAKE_VERSION VERSION_GREATER_EQUAL 3.19)
+    cmake_language(DEFER DIRECTORY ${CMAKE_SOURCE_DIR} CALL cuesta_trim_shaderc)
+endif()

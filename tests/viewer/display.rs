@@ -1,6 +1,6 @@
 //! A display of its own for a test, and the hands that press its keys and move its mouse.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -13,9 +13,12 @@ pub struct Display {
 
 impl Display {
     /// Starts one on a free number, or says what is missing.
+    ///
+    /// A server resets when its last client leaves, and drops whoever connects meanwhile: `-noreset`, as every
+    /// question to `xdotool` is a client that leaves.
     pub fn start() -> Result<Self, String> {
         let started = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"])
+            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn();
@@ -43,9 +46,14 @@ impl Display {
         String::from_utf8_lossy(&output.stdout).trim().to_string()
     }
 
-    /// The number of the window whose title contains this.
-    pub fn window(&self, title: &str) -> String {
+    /// The number of the window whose title contains this, opened by a program that still runs.
+    pub fn window(&self, title: &str, program: &mut Child) -> String {
         eventually("a window", || {
+            if program.try_wait().expect("a child").is_some() {
+                let mut told = String::new();
+                program.stderr.take().map(|mut err| err.read_to_string(&mut told));
+                panic!("the program ended before it had a window: {told}");
+            }
             let found = self.on(Command::new("xdotool").args(["search", "--onlyvisible", "--name", title])).output();
             let text = String::from_utf8(found.expect("xdotool runs").stdout).expect("digits");
             text.lines().next().map(str::to_string)
@@ -63,14 +71,14 @@ impl Drop for Display {
 /// Waits until there is something.
 ///
 /// # Panics
-/// If there is nothing after a minute: the software device is slow, but not that slow.
+/// If there is nothing after three minutes: the software device is slow, but not that slow.
 pub fn eventually<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let started = Instant::now();
     loop {
         if let Some(found) = look() {
             return found;
         }
-        assert!(started.elapsed() < Duration::from_secs(60), "waited in vain for {what}");
+        assert!(started.elapsed() < Duration::from_secs(180), "waited in vain for {what}");
         std::thread::sleep(Duration::from_millis(30));
     }
 }

@@ -26,10 +26,10 @@ impl<'a> Viewer<'a> {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
         command.args(["view", "demo", "--size", "320x240", "--tolerance", "2", "--validate", "--json"]);
         // Should a key be lost, it still ends.
-        command.args(["--seconds", "300"]).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let program = display.on(&mut command).spawn().expect("the program starts");
-        let viewer =
-            Self { display, program: Some(program), window: display.window("cuesta"), folder, pictures: Cell::new(0) };
+        command.args(["--seconds", "600"]).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut program = display.on(&mut command).spawn().expect("the program starts");
+        let window = display.window("cuesta", &mut program);
+        let viewer = Self { display, program: Some(program), window, folder, pictures: Cell::new(0) };
         viewer.focus();
         viewer
     }
