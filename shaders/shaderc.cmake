@@ -2,7 +2,6 @@
 set(CMAKE_C_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
 set(CMAKE_CXX_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
 set(SKIP_SPIRV_TOOLS_INSTALL ON CACHE BOOL "")
-set(SHADERC_SKIP_EXECUTABLES ON CACHE BOOL "")
 
 # Once all is declared: leave out what the compiler does not need, and read its largest headers once.
 function(cuesta_trim_shaderc)
