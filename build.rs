@@ -22,6 +22,10 @@ mod shaders {
     const STAGES: &[(&str, ShaderKind)] =
         &[("vert", ShaderKind::Vertex), ("frag", ShaderKind::Fragment), ("comp", ShaderKind::Compute)];
 
+    /// Shaders compiled a second time with a macro defined: source, macro, name of the variant.
+    const VARIANTS: &[(&str, &str, &str)] =
+        &[("lattice.vert", "CAPTURE", "lattice.capture.vert"), ("explicit.vert", "CAPTURE", "explicit.capture.vert")];
+
     pub fn compile_all() {
         println!("cargo:rerun-if-changed=shaders");
         println!("cargo:rerun-if-changed=src/draw/layout.rs");
@@ -35,16 +39,18 @@ mod shaders {
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
             let Some((_, kind)) = STAGES.iter().find(|(name, _)| *name == extension) else { continue };
             let name = path.file_name().expect("a file").to_str().expect("UTF-8").to_string();
-            match compile(&compiler, &path, *kind) {
-                Ok(words) => {
-                    let spirv = out.join(format!("{name}.spv"));
-                    std::fs::write(&spirv, words).expect("OUT_DIR is writable");
-                    table += &format!("    ({name:?}, include_bytes!({:?})),\n", spirv.to_str().expect("UTF-8"));
-                }
-                Err(message) => {
-                    failed = true;
-                    for line in message.lines() {
-                        println!("cargo::error={line}");
+            let variants = VARIANTS.iter().filter(|(source, ..)| *source == name);
+            let variants = variants.map(|(_, define, variant)| (Some(*define), variant.to_string()));
+            for (define, name) in std::iter::once((None, name.clone())).chain(variants) {
+                match compile(&compiler, &path, *kind, define) {
+                    Ok(words) => {
+                        let spirv = out.join(format!("{name}.spv"));
+                        std::fs::write(&spirv, words).expect("OUT_DIR is writable");
+                        table += &format!("    ({name:?}, include_bytes!({:?})),\n", spirv.to_str().expect("UTF-8"));
+                    }
+                    Err(message) => {
+                        failed = true;
+                        message.lines().for_each(|line| println!("cargo::error={line}"));
                     }
                 }
             }
@@ -55,7 +61,7 @@ mod shaders {
         }
     }
 
-    fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind) -> Result<Vec<u8>, String> {
+    fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind, define: Option<&str>) -> Result<Vec<u8>, String> {
         let source = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let mut options = CompileOptions::new().map_err(|e| e.to_string())?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
@@ -64,6 +70,9 @@ mod shaders {
         // Names of structs and members: the layout test reads them.
         options.set_generate_debug_info();
         options.set_warnings_as_errors();
+        if let Some(define) = define {
+            options.add_macro_definition(define, None);
+        }
         options.set_include_callback(|name, _, from, _| {
             let content = match name {
                 "layout.glsl" => Ok(super::layout::GLSL.to_string()),

@@ -1,8 +1,19 @@
-// From a placed vertex to the rasteriser, the same for every source.
+// From a placed vertex to the rasteriser, the same for every source; with CAPTURE also to a buffer.
 
 layout(location = 0) out vec3 out_relative;
 layout(location = 1) out vec2 out_lattice;
 layout(location = 2) flat out uvec2 out_level_batch;
+
+#ifdef CAPTURE
+layout(set = 1, binding = 0, scalar) writeonly buffer CapturedBlock { Captured captured[]; };
+layout(push_constant, scalar) uniform PartBlock { CapturedPart part; };
+
+void capture(ivec2 at, float height) {
+    uint instance = uint(gl_InstanceIndex) - part.first_instance;
+    uint vertex = uint(gl_VertexIndex) - part.first_vertex;
+    captured[part.base + instance * part.vertices + vertex] = Captured(at, height, out_relative);
+}
+#endif
 
 void emit_vertex(ivec2 at, float height, Instance instance) {
     out_relative = relative_position(at, height);
@@ -10,4 +21,7 @@ void emit_vertex(ivec2 at, float height, Instance instance) {
     out_lattice = vec2(at - frame.anchor);
     out_level_batch = uvec2(instance.level, instance.batch);
     gl_Position = frame.clip_from_relative * vec4(out_relative, 1.0);
+#ifdef CAPTURE
+    capture(at, height);
+#endif
 }

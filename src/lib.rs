@@ -10,6 +10,7 @@
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
+//! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
 
@@ -27,6 +28,9 @@ pub mod plan;
 pub mod gpu;
 
 pub mod measure;
+
+#[cfg(feature = "vulkan")]
+pub mod scene;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;

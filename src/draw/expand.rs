@@ -46,42 +46,46 @@ pub fn visit_draw(
     draw: &Draw,
     visit: &mut impl FnMut(&Drawn),
 ) {
-    for instance in draw.instances.clone() {
-        visit_instance(field, frame, resident, list, draw, instance, visit);
-    }
-}
-
-fn visit_instance(
-    field: &Field,
-    frame: &Frame,
-    resident: &Geometry,
-    list: &DrawList,
-    draw: &Draw,
-    instance: u32,
-    visit: &mut impl FnMut(&Drawn),
-) {
-    let geometry = if draw.source == Source::Streamed { &list.streamed } else { resident };
-    let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
-    let placed = &list.instances[instance as usize];
-    let corner = |index: u32| corner(field, frame, geometry, draw.source, placed, index);
-    let mut emit = |corners: Triangle| {
+    let geometry = geometry(draw.source, resident, list);
+    let placed = |instance: u32| &list.instances[instance as usize];
+    let corner = |instance, index| corner(field, frame, geometry, draw.source, placed(instance), index);
+    assemble(geometry, draw, corner, |instance, corners| {
         if doubled_area(&corners) != 0 {
             visit(&Drawn { corners, instance });
         }
-    };
-    match draw.topology {
-        Topology::Triangles => {
-            for t in indices.chunks_exact(3) {
-                emit([corner(t[0]), corner(t[1]), corner(t[2])]);
+    });
+}
+
+/// Calls `visit` for every triangle of one draw: its instance, and its corners as `corner` tells them by instance and
+/// index, in the order of its winding. `geometry` is what the draw's indices address ([`geometry`]).
+pub fn assemble<T>(
+    geometry: &Geometry,
+    draw: &Draw,
+    corner: impl Fn(u32, u32) -> T,
+    mut visit: impl FnMut(u32, [T; 3]),
+) {
+    let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
+    for instance in draw.instances.clone() {
+        let corner = |index: u32| corner(instance, index);
+        match draw.topology {
+            Topology::Triangles => {
+                for t in indices.chunks_exact(3) {
+                    visit(instance, [corner(t[0]), corner(t[1]), corner(t[2])]);
+                }
             }
-        }
-        Topology::Strip => {
-            for (k, t) in indices.windows(3).enumerate() {
-                let [a, b, c] = [corner(t[0]), corner(t[1]), corner(t[2])];
-                emit(if k % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            Topology::Strip => {
+                for (k, t) in indices.windows(3).enumerate() {
+                    let (first, second) = if k % 2 == 0 { (t[0], t[1]) } else { (t[1], t[0]) };
+                    visit(instance, [corner(first), corner(second), corner(t[2])]);
+                }
             }
         }
     }
+}
+
+/// What a source's indices address.
+pub fn geometry<'a>(source: Source, resident: &'a Geometry, list: &'a DrawList) -> &'a Geometry {
+    if source == Source::Streamed { &list.streamed } else { resident }
 }
 
 fn corner(field: &Field, frame: &Frame, geometry: &Geometry, source: Source, placed: &Instance, index: u32) -> Corner {

@@ -116,4 +116,48 @@ shared! {
         /// Morph weight, 0 the finer shape and 1 the coarser one.
         morph: float,
     }
+
+    /// What the vertex program made of a vertex, when it is captured.
+    struct Captured {
+        /// Lattice position (finest samples).
+        position: ivec2,
+        /// Height, metres.
+        height: float,
+        /// Position relative to the eye, metres: what the rasteriser is given.
+        relative: vec3,
+    }
+
+    /// Where the captured vertices of a part of a draw go.
+    struct CapturedPart {
+        /// Index of its first record.
+        base: uint,
+        /// Its first instance.
+        first_instance: uint,
+        /// Its lowest vertex index.
+        first_vertex: uint,
+        /// Records per instance.
+        vertices: uint,
+    }
+
+    /// What the oracle finds in one triangle.
+    struct TriangleError {
+        /// Samples that the triangle counts.
+        samples: uint,
+        /// Sum of the counted vertical errors' squares, metres².
+        squares_m: float,
+        /// Sum of the counted screen errors' squares, pixels².
+        squares_px: float,
+        /// Largest vertical error, metres.
+        largest_m: float,
+        /// Largest screen error, pixels.
+        largest_px: float,
+    }
+
+    /// What the oracle is given beside the scene.
+    struct OracleInput {
+        /// Half the picture, pixels.
+        half_size: vec2,
+        /// Triangles.
+        triangles: uint,
+    }
 }

@@ -59,6 +59,8 @@ pub struct Gpu {
     pub timestamp_ns: f64,
     /// Whether pipeline statistics can be queried.
     pub has_statistics: bool,
+    /// Whether vertex programs may write to buffers: what capturing the as-drawn mesh needs.
+    pub captures: bool,
     /// Allocator of all memory.
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     utils: Option<ext::debug_utils::Device>,
@@ -177,7 +179,8 @@ impl Gpu {
             .multi_draw_indirect(true)
             .draw_indirect_first_instance(true)
             .fill_mode_non_solid(true)
-            .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE);
+            .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE)
+            .vertex_pipeline_stores_and_atomics(available.vertex_pipeline_stores_and_atomics == vk::TRUE);
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
@@ -219,6 +222,7 @@ impl Gpu {
             limits,
             timestamp_ns: if has_timestamps { f64::from(limits.timestamp_period) } else { 0.0 },
             has_statistics: available.pipeline_statistics_query == vk::TRUE,
+            captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             utils,
             bytes: Mutex::default(),

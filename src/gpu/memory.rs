@@ -263,11 +263,14 @@ pub fn memory_barrier(
     unsafe { gpu.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
 }
 
+/// What images of a format hold.
+pub fn aspect(format: vk::Format) -> vk::ImageAspectFlags {
+    if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR }
+}
+
 fn range(format: vk::Format) -> vk::ImageSubresourceRange {
-    let aspect =
-        if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
     vk::ImageSubresourceRange::default()
-        .aspect_mask(aspect)
+        .aspect_mask(aspect(format))
         .level_count(vk::REMAINING_MIP_LEVELS)
         .layer_count(vk::REMAINING_ARRAY_LAYERS)
 }

@@ -4,12 +4,15 @@
 //! steps. Everything is made at start; nothing is created inside a frame.
 #![allow(unsafe_code)]
 
+pub mod capture;
 pub mod device;
+pub mod floor;
 pub mod frames;
 #[cfg(feature = "viewer")]
 pub mod hud;
 pub mod instance;
 pub mod memory;
+pub mod oracle;
 pub mod pages;
 pub mod pipelines;
 #[cfg(feature = "viewer")]

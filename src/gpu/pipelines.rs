@@ -38,7 +38,7 @@ impl Pipelines {
                     .binding(binding)
                     .descriptor_type(kind)
                     .descriptor_count(1)
-                    .stage_flags(vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
+                    .stage_flags(vk::ShaderStageFlags::ALL)
             })
             .collect();
         // SAFETY: the device is alive; Drop destroys what is made here.
@@ -55,7 +55,7 @@ impl Pipelines {
         pipelines.sky = pipelines.make_sky(formats)?;
         for source in [Source::Lattice, Source::Resident] {
             for topology in [Topology::Triangles, Topology::Strip] {
-                let pipeline = pipelines.make_terrain(plan, formats, source, topology)?;
+                let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
                 pipelines.terrain.insert((source, topology), pipeline);
             }
         }
@@ -68,133 +68,161 @@ impl Pipelines {
         self.terrain[&(source, topology)]
     }
 
-    fn make_terrain(
-        &self,
-        plan: &ScenePlan,
-        formats: Formats,
-        source: Source,
-        topology: Topology,
-    ) -> Result<vk::Pipeline> {
-        let constants = Constants::of(plan);
-        let (vertex, stride, attributes) = vertex_input(source);
-        let bindings = [
-            vk::VertexInputBindingDescription::default().binding(0).stride(stride),
-            vk::VertexInputBindingDescription::default()
-                .binding(1)
-                .stride(size_of::<Instance>() as u32)
-                .input_rate(vk::VertexInputRate::INSTANCE),
-        ];
-        self.make(Description {
-            name: if source == Source::Lattice { "lattice" } else { "explicit" },
-            vertex,
-            fragment: "terrain.frag",
-            constants: &constants,
-            input: vk::PipelineVertexInputStateCreateInfo::default()
-                .vertex_binding_descriptions(&bindings)
-                .vertex_attribute_descriptions(&attributes),
-            topology: match topology {
-                Topology::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
-                Topology::Strip => vk::PrimitiveTopology::TRIANGLE_STRIP,
-            },
-            wireframe: plan.wireframe,
-            // Land is drawn first and hides; the far plane lies at depth 0.
-            depth: (true, vk::CompareOp::GREATER),
-            cull: vk::CullModeFlags::BACK,
-            formats,
-        })
-    }
-
     fn make_sky(&self, formats: Formats) -> Result<vk::Pipeline> {
-        self.make(Description {
+        let description = Description {
             name: "sky",
             vertex: "sky.vert",
-            fragment: "sky.frag",
+            fragment: Some("sky.frag"),
             constants: &Constants::new(&[]),
             input: vk::PipelineVertexInputStateCreateInfo::default(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             wireframe: false,
             // Only where nothing was drawn.
-            depth: (false, vk::CompareOp::EQUAL),
+            depth: Some((false, vk::CompareOp::EQUAL)),
             cull: vk::CullModeFlags::NONE,
-            formats,
-        })
-    }
-
-    fn make(&self, d: Description) -> Result<vk::Pipeline> {
-        let gpu = &self.gpu;
-        let (vertex, fragment) = (shaders::module(gpu, d.vertex)?, shaders::module(gpu, d.fragment)?);
-        let special = d.constants.info();
-        let stage = |stage, module| {
-            vk::PipelineShaderStageCreateInfo::default()
-                .stage(stage)
-                .module(module)
-                .name(c"main")
-                .specialization_info(&special)
+            formats: Some(formats),
         };
-        let stages = [stage(vk::ShaderStageFlags::VERTEX, vertex), stage(vk::ShaderStageFlags::FRAGMENT, fragment)];
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(d.topology);
-        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        let polygon = if d.wireframe { vk::PolygonMode::LINE } else { vk::PolygonMode::FILL };
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(polygon)
-            .cull_mode(d.cull)
-            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .line_width(1.0);
-        let samples =
-            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(d.depth.0)
-            .depth_compare_op(d.depth.1);
-        let blend = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
-        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-        let colours = [d.formats.colour];
-        let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(&colours)
-            .depth_attachment_format(d.formats.depth);
-        let info = vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
-            .vertex_input_state(&d.input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&samples)
-            .depth_stencil_state(&depth)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .layout(self.layout)
-            .push_next(&mut rendering);
-        // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
-        let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-        // SAFETY: no call uses the modules any more.
-        unsafe {
-            gpu.raw.destroy_shader_module(vertex, None);
-            gpu.raw.destroy_shader_module(fragment, None);
-        }
-        let pipeline = made.map_err(|(_, e)| e).with_context(|| format!("pipeline {}", d.name))?[0];
-        gpu.name(pipeline, d.name);
-        Ok(pipeline)
+        make(&self.gpu, self.layout, description)
     }
+}
+
+/// What a terrain pipeline is for.
+#[derive(Clone, Copy)]
+pub(super) enum Pass {
+    /// A picture in these formats.
+    Picture(Formats),
+    /// The vertices alone, to a buffer.
+    Capture,
+}
+
+/// Makes the pipeline that runs such draws through their vertex program.
+pub(super) fn terrain(
+    gpu: &Arc<Gpu>,
+    layout: vk::PipelineLayout,
+    plan: &ScenePlan,
+    pass: Pass,
+    source: Source,
+    topology: Topology,
+) -> Result<vk::Pipeline> {
+    let constants = Constants::of(plan);
+    let (stride, attributes) = vertex_input(source);
+    let bindings = [
+        vk::VertexInputBindingDescription::default().binding(0).stride(stride),
+        vk::VertexInputBindingDescription::default()
+            .binding(1)
+            .stride(size_of::<Instance>() as u32)
+            .input_rate(vk::VertexInputRate::INSTANCE),
+    ];
+    let (name, [picture, capture]) = match source {
+        Source::Lattice => ("lattice", ["lattice.vert", "lattice.capture.vert"]),
+        Source::Resident | Source::Streamed => ("explicit", ["explicit.vert", "explicit.capture.vert"]),
+    };
+    let (vertex, fragment, depth, formats) = match pass {
+        // Land is drawn first and hides; the far plane lies at depth 0.
+        Pass::Picture(formats) => (picture, Some("terrain.frag"), Some((true, vk::CompareOp::GREATER)), Some(formats)),
+        Pass::Capture => (capture, None, None, None),
+    };
+    let description = Description {
+        name,
+        vertex,
+        fragment,
+        constants: &constants,
+        input: vk::PipelineVertexInputStateCreateInfo::default()
+            .vertex_binding_descriptions(&bindings)
+            .vertex_attribute_descriptions(&attributes),
+        topology: match topology {
+            Topology::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
+            Topology::Strip => vk::PrimitiveTopology::TRIANGLE_STRIP,
+        },
+        wireframe: plan.wireframe,
+        depth,
+        cull: vk::CullModeFlags::BACK,
+        formats,
+    };
+    make(gpu, layout, description)
+}
+
+/// Makes a graphics pipeline.
+pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -> Result<vk::Pipeline> {
+    let vertex = shaders::module(gpu, d.vertex)?;
+    let fragment = d.fragment.map(|name| shaders::module(gpu, name)).transpose()?;
+    let special = d.constants.info();
+    let stage = |stage, module| {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(stage)
+            .module(module)
+            .name(c"main")
+            .specialization_info(&special)
+    };
+    let mut stages = vec![stage(vk::ShaderStageFlags::VERTEX, vertex)];
+    stages.extend(fragment.map(|module| stage(vk::ShaderStageFlags::FRAGMENT, module)));
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(d.topology);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    let polygon = if d.wireframe { vk::PolygonMode::LINE } else { vk::PolygonMode::FILL };
+    let raster = vk::PipelineRasterizationStateCreateInfo::default()
+        .polygon_mode(polygon)
+        .cull_mode(d.cull)
+        .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+        .line_width(1.0)
+        // Without a fragment program only the vertex program's own writes matter.
+        .rasterizer_discard_enable(fragment.is_none());
+    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(d.depth.is_some())
+        .depth_write_enable(d.depth.is_some_and(|(writes, _)| writes))
+        .depth_compare_op(d.depth.map_or(vk::CompareOp::ALWAYS, |(_, compare)| compare));
+    let colours: Vec<_> = d.formats.iter().map(|formats| formats.colour).collect();
+    let blend = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
+    let blend = vec![blend; colours.len()];
+    let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
+    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let depth_format = d.depth.and(d.formats).map_or(vk::Format::UNDEFINED, |formats| formats.depth);
+    let mut rendering = vk::PipelineRenderingCreateInfo::default()
+        .color_attachment_formats(&colours)
+        .depth_attachment_format(depth_format);
+    let info = vk::GraphicsPipelineCreateInfo::default()
+        .stages(&stages)
+        .vertex_input_state(&d.input)
+        .input_assembly_state(&assembly)
+        .viewport_state(&viewport)
+        .rasterization_state(&raster)
+        .multisample_state(&samples)
+        .depth_stencil_state(&depth)
+        .color_blend_state(&blend)
+        .dynamic_state(&dynamic)
+        .layout(layout)
+        .push_next(&mut rendering);
+    // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
+    let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+    // SAFETY: no call uses the modules any more.
+    unsafe {
+        gpu.raw.destroy_shader_module(vertex, None);
+        fragment.into_iter().for_each(|module| gpu.raw.destroy_shader_module(module, None));
+    }
+    let pipeline = made.map_err(|(_, e)| e).with_context(|| format!("pipeline {}", d.name))?[0];
+    gpu.name(pipeline, d.name);
+    Ok(pipeline)
 }
 
 /// What distinguishes one pipeline from another.
-struct Description<'a> {
-    name: &'static str,
-    vertex: &'static str,
-    fragment: &'static str,
-    constants: &'a Constants,
-    input: vk::PipelineVertexInputStateCreateInfo<'a>,
-    topology: vk::PrimitiveTopology,
-    wireframe: bool,
-    depth: (bool, vk::CompareOp),
-    cull: vk::CullModeFlags,
-    formats: Formats,
+pub(super) struct Description<'a> {
+    pub name: &'static str,
+    pub vertex: &'static str,
+    pub fragment: Option<&'static str>,
+    pub constants: &'a Constants,
+    pub input: vk::PipelineVertexInputStateCreateInfo<'a>,
+    pub topology: vk::PrimitiveTopology,
+    pub wireframe: bool,
+    /// Whether it writes depth, and its test; `None`: there is no depth.
+    pub depth: Option<(bool, vk::CompareOp)>,
+    pub cull: vk::CullModeFlags,
+    /// The attachments; `None`: there are none.
+    pub formats: Option<Formats>,
 }
 
-/// Vertex program, vertex stride and attributes of a source.
-fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttributeDescription>) {
+/// Vertex stride and attributes of a source.
+fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription>) {
     let attribute = |binding: u32| {
         move |(location, format, offset): (u32, vk::Format, usize)| vk::VertexInputAttributeDescription {
             location,
@@ -207,12 +235,9 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
     const UINT: vk::Format = vk::Format::R32_UINT;
     const FLOAT: vk::Format = vk::Format::R32_SFLOAT;
     const SIDES: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
-    let (shader, stride, vertex) = match source {
-        Source::Lattice => {
-            ("lattice.vert", size_of::<LatticeVertex>(), vec![(0, PAIR, offset_of!(LatticeVertex, position))])
-        }
+    let (stride, vertex) = match source {
+        Source::Lattice => (size_of::<LatticeVertex>(), vec![(0, PAIR, offset_of!(LatticeVertex, position))]),
         Source::Resident | Source::Streamed => (
-            "explicit.vert",
             size_of::<ExplicitVertex>(),
             vec![
                 (0, PAIR, offset_of!(ExplicitVertex, position)),
@@ -236,7 +261,7 @@ fn vertex_input(source: Source) -> (&'static str, u32, Vec<vk::VertexInputAttrib
         instance.push((15, SIDES, offset_of!(Instance, edge_morph)));
     }
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
-    (shader, stride as u32, attributes)
+    (stride as u32, attributes)
 }
 
 impl Drop for Pipelines {

@@ -14,7 +14,7 @@ use super::frames::{Recording, SLOTS};
 use super::instance::Instance;
 use super::memory::{Image, barriers, image_barrier};
 use super::screenshot::Screenshot;
-use super::target::{Attachment, DEPTH, Formats, depth_image};
+use super::target::{Attachment, DEPTH, Depth, Formats, depth_image};
 
 /// A window of the system, whoever made it.
 pub trait Window: HasWindowHandle + HasDisplayHandle {}
@@ -237,7 +237,7 @@ impl Swapchain {
         for image in unsafe { self.loader.get_swapchain_images(self.raw) }? {
             self.images.push(Shown::new(&self.gpu, image, self.format.format)?);
         }
-        self.depth = Some(depth_image(&self.gpu, self.size)?);
+        self.depth = Some(depth_image(&self.gpu, self.size, vk::ImageUsageFlags::empty())?);
         Ok(())
     }
 
@@ -278,8 +278,8 @@ impl Swapchain {
     ///
     /// # Panics
     /// If [`Swapchain::fit`] never succeeded.
-    pub fn depth(&self) -> &Image {
-        self.depth.as_ref().expect("made with the images")
+    pub fn depth(&self) -> Depth<'_> {
+        (self.depth.as_ref().expect("made with the images"), vk::AttachmentStoreOp::DONT_CARE)
     }
 
     /// Room for a copy of one frame: made before the frame begins.

@@ -8,7 +8,7 @@ use gpu_allocator::MemoryLocation;
 
 use super::device::Gpu;
 use super::frames::Recording;
-use super::memory::{Buffer, Image, ImageInfo, barriers, image_barrier, memory_barrier};
+use super::memory::{Buffer, Image, ImageInfo, aspect, barriers, image_barrier, memory_barrier};
 
 /// Formats of the attachments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,14 +35,24 @@ pub struct Attachment {
     pub size: [u32; 2],
 }
 
-/// A depth image of the size of a target.
-pub fn depth_image(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Image> {
-    let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+/// A depth attachment, and what becomes of its values after the frame.
+pub type Depth<'a> = (&'a Image, vk::AttachmentStoreOp);
+
+/// How a frame leaves its depth image.
+pub const DEPTH_WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
+    vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS,
+    vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
+    vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+);
+
+/// A depth image of the size of a target, for these uses beside that of an attachment.
+pub fn depth_image(gpu: &Arc<Gpu>, size: [u32; 2], uses: vk::ImageUsageFlags) -> Result<Image> {
+    let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | uses;
     Image::new(gpu, ImageInfo { purpose: "depth", size, layers: None, format: DEPTH, usage })
 }
 
 /// Begins drawing into an attachment, cleared to alpha 0 (no land) and the far plane.
-pub fn begin(recording: &Recording, colour: Attachment, depth: &Image) {
+pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
     use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
     let gpu = recording.gpu;
     let commands = recording.commands;
@@ -50,23 +60,18 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: &Image) {
         (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
     let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
     let depth_access = Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
-    barriers(
-        gpu,
-        commands,
-        &[
-            image_barrier(
-                colour.image,
-                colour.format,
-                // After the picture's last use: presented, or copied out.
-                (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED),
-                colour_write,
-            ),
-            depth.barrier(
-                (tests, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
-                (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
-            ),
-        ],
-    );
+    // After the picture's last use: presented, or copied out.
+    let colour_used = (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED);
+    let mut before = vec![image_barrier(colour.image, colour.format, colour_used, colour_write)];
+    before.extend(depth.map(|(image, _)| {
+        // And the depth's: tested, copied out, or read by a pass of its own.
+        let used = tests | Stage::COPY | Stage::FRAGMENT_SHADER;
+        image.barrier(
+            (used, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
+            (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
+        )
+    }));
+    barriers(gpu, commands, &before);
     let clear = vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } };
     let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
     let colours = [vk::RenderingAttachmentInfo::default()
@@ -75,19 +80,20 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: &Image) {
         .load_op(vk::AttachmentLoadOp::CLEAR)
         .store_op(vk::AttachmentStoreOp::STORE)
         .clear_value(clear)];
-    let depth = vk::RenderingAttachmentInfo::default()
-        .image_view(depth.view)
-        .image_layout(Layout::DEPTH_ATTACHMENT_OPTIMAL)
-        .load_op(vk::AttachmentLoadOp::CLEAR)
-        .store_op(vk::AttachmentStoreOp::DONT_CARE)
-        .clear_value(far);
+    let depth = depth.map(|(image, store)| {
+        vk::RenderingAttachmentInfo::default()
+            .image_view(image.view)
+            .image_layout(Layout::DEPTH_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .store_op(store)
+            .clear_value(far)
+    });
     let [width, height] = colour.size;
     let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
-    let info = vk::RenderingInfo::default()
-        .render_area(area)
-        .layer_count(1)
-        .color_attachments(&colours)
-        .depth_attachment(&depth);
+    let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colours);
+    if let Some(depth) = &depth {
+        info = info.depth_attachment(depth);
+    }
     let viewport = [vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() }];
     // SAFETY: the command buffer is being recorded; the attachments live until the frame has ended.
     unsafe {
@@ -109,6 +115,7 @@ pub struct Offscreen {
     /// Its depth image.
     pub depth: Image,
     readback: Buffer,
+    depth_readback: Buffer,
 }
 
 impl Offscreen {
@@ -116,17 +123,16 @@ impl Offscreen {
     pub fn new(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Self> {
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
         let info = ImageInfo { purpose: "colour", size, layers: None, format: Self::FORMATS.colour, usage };
+        // Both colour and depth have four bytes a pixel.
         let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+        let readback =
+            |purpose| Buffer::new(gpu, purpose, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
+        let depth_uses = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::SAMPLED;
         Ok(Self {
             colour: Image::new(gpu, info)?,
-            depth: depth_image(gpu, size)?,
-            readback: Buffer::new(
-                gpu,
-                "read-back",
-                bytes,
-                vk::BufferUsageFlags::TRANSFER_DST,
-                MemoryLocation::GpuToCpu,
-            )?,
+            depth: depth_image(gpu, size, depth_uses)?,
+            readback: readback("read-back")?,
+            depth_readback: readback("depth read-back")?,
         })
     }
 
@@ -139,31 +145,25 @@ impl Offscreen {
         Attachment { image: raw, view, format, size }
     }
 
-    /// Records the copy to the host, after [`end`].
+    /// The depth to draw with; its values stay after the frame.
+    pub fn kept_depth(&self) -> Depth<'_> {
+        (&self.depth, vk::AttachmentStoreOp::STORE)
+    }
+
+    /// Records the copy of the colours to the host, after [`end`].
     pub fn read_back(&self, recording: &Recording) {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-        let gpu = recording.gpu;
         let written =
             (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
+        copy_out(recording, &self.colour, written, &self.readback);
+    }
+
+    /// Records the copy of the depth to the host, after [`end`]; the image stays as the frame left it.
+    pub fn read_back_depth(&self, recording: &Recording) {
+        use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+        copy_out(recording, &self.depth, DEPTH_WRITTEN, &self.depth_readback);
         let copied = (Stage::COPY, Access::TRANSFER_READ, Layout::TRANSFER_SRC_OPTIMAL);
-        barriers(gpu, recording.commands, &[self.colour.barrier(written, copied)]);
-        let [width, height] = self.colour.size;
-        let region = [vk::BufferImageCopy::default()
-            .image_subresource(
-                vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1),
-            )
-            .image_extent(vk::Extent3D { width, height, depth: 1 })];
-        // SAFETY: the command buffer is being recorded; image and buffer live until the frame has ended.
-        unsafe {
-            let layout = Layout::TRANSFER_SRC_OPTIMAL;
-            gpu.raw.cmd_copy_image_to_buffer(recording.commands, self.colour.raw, layout, self.readback.raw, &region);
-        }
-        memory_barrier(
-            gpu,
-            recording.commands,
-            (Stage::COPY, Access::TRANSFER_WRITE),
-            (Stage::HOST, Access::HOST_READ),
-        );
+        barriers(recording.gpu, recording.commands, &[self.depth.barrier(copied, DEPTH_WRITTEN)]);
     }
 
     /// The picture read back last (after the frame has finished); alpha says where land was drawn.
@@ -172,4 +172,32 @@ impl Offscreen {
         let bytes = &self.readback.read()[..4 * width as usize * height as usize];
         image::RgbaImage::from_raw(width, height, bytes.to_vec()).expect("as many bytes as pixels")
     }
+
+    /// The depth read back last, row by row from the top; 0 is infinitely far.
+    pub fn depth_values(&self) -> Vec<f32> {
+        let [width, height] = self.depth.size;
+        bytemuck::pod_collect_to_vec(&self.depth_readback.read()[..4 * width as usize * height as usize])
+    }
+}
+
+/// Records the copy of an image's single layer to a buffer that the host reads.
+fn copy_out(
+    recording: &Recording,
+    image: &Image,
+    written: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
+    to: &Buffer,
+) {
+    use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
+    let (gpu, commands) = (recording.gpu, recording.commands);
+    let copied = (Stage::COPY, Access::TRANSFER_READ, Layout::TRANSFER_SRC_OPTIMAL);
+    barriers(gpu, commands, &[image.barrier(written, copied)]);
+    let [width, height] = image.size;
+    let layers = vk::ImageSubresourceLayers::default().aspect_mask(aspect(image.format)).layer_count(1);
+    let extent = vk::Extent3D { width, height, depth: 1 };
+    let region = [vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)];
+    // SAFETY: the command buffer is being recorded; image and buffer live until the frame has ended.
+    unsafe {
+        gpu.raw.cmd_copy_image_to_buffer(commands, image.raw, Layout::TRANSFER_SRC_OPTIMAL, to.raw, &region);
+    }
+    memory_barrier(gpu, commands, (Stage::COPY, Access::TRANSFER_WRITE), (Stage::HOST, Access::HOST_READ));
 }

@@ -203,6 +203,16 @@ impl Terrain {
         })
     }
 
+    /// The layout of the descriptors of the frame and the scene's images.
+    pub fn set_layout(&self) -> vk::DescriptorSetLayout {
+        self.pipelines.set_layout
+    }
+
+    /// The descriptors of a frame that was prepared.
+    pub fn scene_set(&self, recording: &Recording) -> vk::DescriptorSet {
+        self.slots[recording.slot].set
+    }
+
     fn submit(&self, r: &Recording, submission: Submission, first: usize, run: &[Draw]) {
         let raw = &self.gpu.raw;
         match submission {
@@ -239,7 +249,7 @@ impl Terrain {
         }
     }
 
-    fn bind_geometry(&self, r: &Recording, source: Source) {
+    pub(super) fn bind_geometry(&self, r: &Recording, source: Source) {
         let slot = &self.slots[r.slot];
         let (vertices, indices) = match source {
             Source::Lattice => (&self.resident.lattice, &self.resident.indices),

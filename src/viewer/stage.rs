@@ -145,7 +145,7 @@ impl Stage {
         let started = Instant::now();
         let frame = shot.look.frame(&setup.field, shot.view, self.range);
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
-        target::begin(&recording, image.attachment, self.swapchain.depth());
+        target::begin(&recording, image.attachment, Some(self.swapchain.depth()));
         self.terrain.draw(&mut recording, &self.list)?;
         let Painted { primitives, pixels_per_point, .. } = &mut overlay;
         self.hud.draw(&mut recording, shot.view.size, *pixels_per_point, primitives)?;

@@ -18,6 +18,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("plan", &["view", "height", "draw"]),
     ("gpu", &["view", "height", "draw", "plan"]),
     ("measure", &["view", "height", "draw"]),
+    ("scene", &["view", "height", "draw", "lod", "plan", "gpu", "measure"]),
     ("cli", EVERYTHING),
     ("bench", BELOW_REPORT),
     ("profile", BELOW_REPORT),
@@ -27,13 +28,15 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("report", &["bench", "profile", "stress", "measure"]),
 ];
 
-const BELOW_REPORT: &[&str] =
-    &["view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "bench", "profile", "stress", "viewer"];
+const BELOW_REPORT: &[&str] = &[
+    "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "scene", "bench", "profile", "stress",
+    "viewer",
+];
 
 /// The command line starts whatever there is, the report too.
 const EVERYTHING: &[&str] = &[
-    "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "bench", "profile", "stress", "viewer",
-    "report",
+    "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "scene", "bench", "profile", "stress",
+    "viewer", "report",
 ];
 
 /// What is wrong with a file of `src`, each as `file:line: what`. `file` is relative to `src`.

@@ -26,8 +26,8 @@ fn compare(gpu: &Arc<Gpu>, name: &str, colour: Colour, file: &str) {
     view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
     let look = Look { colour, ..Look::default() };
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
-    let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
-    let drawn = scene.shoot(technique(&field, name, &[]).as_mut(), &view).unwrap().picture;
+    let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+    let drawn = scene.shoot(technique(&field, name, &[]).as_mut(), &view, 1).unwrap().picture;
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{file}.png"));
     if std::env::var("UPDATE_GOLDEN").as_deref() == Ok("1") {
         drawn.save(&path).unwrap();

@@ -1,6 +1,7 @@
 //! What only a device can show. Every test runs with core and synchronization validation on and fails on any
 //! message. Without a device they say so and pass, unless REQUIRE_GPU=1.
 
+mod capture;
 mod golden;
 mod layout;
 mod neck;
@@ -9,11 +10,11 @@ mod twin;
 
 use std::sync::Arc;
 
-use cuesta::cli::render::{Scene, Shot};
 use cuesta::gpu::{Choice, Gpu, Instance};
 use cuesta::height::{Field, Holes, Samples, synth};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::{Scene, Shot};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
@@ -53,7 +54,7 @@ fn shoot_planned(
     view: &View,
 ) -> Shot {
     let look = Look::default();
-    Scene { gpu, field, plan, look: &look, overlay: None }.shoot(technique, view).expect("a picture")
+    Scene { gpu, field, plan, look: &look, overlay: None }.shoot(technique, view, 1).expect("a picture")
 }
 
 /// The picture of a field with the default look.
@@ -188,8 +189,8 @@ fn recorded_draws_and_indirect_ones_give_the_same_picture() {
         assert_eq!(indirect.picture, direct.picture);
         assert_eq!(indirect.list.commands(), 1);
         assert!(direct.list.commands() > 20);
-        let statistics = [&indirect, &direct].map(|s| s.timing.statistics.map(|s| s[2]));
+        let statistics = [&indirect, &direct].map(|s| s.times.gpu.statistics.map(|s| s[2]));
         assert_eq!(statistics[0], statistics[1], "fragments run");
-        assert!(indirect.timing.total_ms > 0.0);
+        assert!(indirect.times.gpu.total_ms > 0.0);
     });
 }

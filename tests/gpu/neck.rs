@@ -10,14 +10,14 @@ use cuesta::view::View;
 use super::{aslant, mountains, on_device, shoot, technique};
 
 /// All samples as explicit vertices, brought to the device in one of several ways.
-struct Explicit {
+pub struct Explicit {
     mesh: Geometry,
     resident: Geometry,
     way: Way,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+pub enum Way {
     Resident,
     Streamed,
     /// Resident geometry that starts as nonsense and is overwritten before it is drawn.
@@ -27,7 +27,7 @@ enum Way {
 }
 
 impl Explicit {
-    fn new(field: &Field, way: Way) -> Self {
+    pub fn new(field: &Field, way: Way) -> Self {
         let [w, h] = field.size().map(|n| n as i32);
         let vertices = (0..h).flat_map(|z| (0..w).map(move |x| [x, z]));
         let vertices: Vec<_> = vertices

@@ -52,9 +52,9 @@ fn fog_and_colours_are_seen() {
             .chain([Look { fog: 3e-4, ..Look::default() }, Look { wireframe: true, ..Look::default() }]);
         for look in looks {
             let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
-            let scene = cuesta::cli::render::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
-            pictures.push((look, scene.shoot(geomipmap.as_mut(), &view).unwrap().picture));
+            pictures.push((look, scene.shoot(geomipmap.as_mut(), &view, 1).unwrap().picture));
         }
         for (k, (look, picture)) in pictures.iter().enumerate() {
             for (other, other_picture) in &pictures[..k] {

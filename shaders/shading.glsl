@@ -1,0 +1,132 @@
+// Colour of a place of the drawn surface.
+
+layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
+layout(set = 0, binding = 3) uniform sampler2D overlay;
+
+layout(constant_id = 3) const bool HOLES = false;
+layout(constant_id = 4) const bool FOG = false;
+// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch (plan::Colour).
+layout(constant_id = 5) const uint COLOUR = 0;
+// The height texture can be filtered linearly by the device.
+layout(constant_id = 6) const bool FILTERED = false;
+
+bool is_hole(ivec2 at) {
+    return texelFetch(hole_pages, texel(clamp(at, ivec2(0), frame.last)), 0).r != 0;
+}
+
+// The finest surface's triangle around a lattice position: cell, position in it, and whether the diagonal
+// runs from (0, 0) to (1, 1) (src/height/rtin.rs).
+struct Cell { ivec2 at; vec2 inside; bool falling; };
+
+Cell cell_at(vec2 lattice) {
+    ivec2 at = clamp(ivec2(floor(lattice)) + frame.anchor, ivec2(0), frame.last - 1);
+    vec2 inside = clamp(lattice - vec2(at - frame.anchor), 0.0, 1.0);
+    return Cell(at, inside, ((at.x + at.y) & 1) == 0);
+}
+
+// Without data at one of its three corners, the triangle is not there.
+bool in_hole(Cell cell) {
+    bool first = cell.falling ? cell.inside.y >= cell.inside.x : cell.inside.x + cell.inside.y <= 1.0;
+    ivec2 p = cell.falling ? ivec2(0) : ivec2(1, 0);
+    ivec2 q = cell.falling ? ivec2(1) : ivec2(0, 1);
+    ivec2 r = cell.falling ? (first ? ivec2(0, 1) : ivec2(1, 0)) : (first ? ivec2(0) : ivec2(1));
+    return is_hole(cell.at + p) || is_hole(cell.at + q) || is_hole(cell.at + r);
+}
+
+// Height of the samples' own surface.
+float true_height(Cell cell) {
+    float h00 = sample_height(cell.at);
+    float h10 = sample_height(cell.at + ivec2(1, 0));
+    float h01 = sample_height(cell.at + ivec2(0, 1));
+    float h11 = sample_height(cell.at + ivec2(1));
+    vec2 p = cell.inside;
+    if (cell.falling) {
+        return p.x >= p.y ? h00 + p.x * (h10 - h00) + p.y * (h11 - h10) : h00 + p.y * (h01 - h00) + p.x * (h11 - h01);
+    }
+    return p.x + p.y <= 1.0 ? h00 + p.x * (h10 - h00) + p.y * (h01 - h00)
+                            : h11 + (1.0 - p.x) * (h01 - h11) + (1.0 - p.y) * (h10 - h11);
+}
+
+float linear_height(vec2 lattice) {
+    vec2 absolute = lattice + vec2(frame.anchor);
+    if (FILTERED) {
+        vec2 uv = (absolute + 0.5) / vec2(frame.stored);
+        float stored = textureLod(height_pages, vec3(uv, 0.0), 0.0).r;
+        return CODED ? (stored * 65535.0 - frame.height_zero) * frame.height_scale : stored;
+    }
+    ivec2 at = clamp(ivec2(floor(lattice)) + frame.anchor, ivec2(0), frame.last - 1);
+    vec2 p = clamp(lattice - vec2(at - frame.anchor), 0.0, 1.0);
+    float north = mix(sample_height(at), sample_height(at + ivec2(1, 0)), p.x);
+    float south = mix(sample_height(at + ivec2(0, 1)), sample_height(at + ivec2(1)), p.x);
+    return mix(north, south, p.y);
+}
+
+// Normal from central differences, with the true spacing on both axes. The differences widen with the size
+// of a pixel on the ground, so that far land does not glitter.
+vec3 normal_at(vec2 lattice, float pixel) {
+    vec2 reach = max(vec2(1.0), pixel / frame.spacing);
+    vec2 last = vec2(frame.last - frame.anchor);
+    vec2 first = vec2(-frame.anchor);
+    vec2 west = vec2(max(lattice.x - reach.x, first.x), lattice.y);
+    vec2 east = vec2(min(lattice.x + reach.x, last.x), lattice.y);
+    vec2 north = vec2(lattice.x, max(lattice.y - reach.y, first.y));
+    vec2 south = vec2(lattice.x, min(lattice.y + reach.y, last.y));
+    float slope_x = (linear_height(west) - linear_height(east)) / ((east.x - west.x) * frame.spacing.x);
+    float slope_z = (linear_height(north) - linear_height(south)) / ((south.y - north.y) * frame.spacing.y);
+    return normalize(vec3(slope_x, 1.0, slope_z));
+}
+
+// Hypsometric tint: green lowland, ochre slopes, grey rock, snow.
+vec3 tint(float height, vec3 normal) {
+    float t = clamp((height - frame.height_range.x) / max(frame.height_range.y - frame.height_range.x, 1e-6), 0.0, 1.0);
+    vec3 colour = mix(vec3(0.11, 0.20, 0.07), vec3(0.27, 0.28, 0.11), smoothstep(0.0, 0.28, t));
+    colour = mix(colour, vec3(0.36, 0.28, 0.18), smoothstep(0.25, 0.55, t));
+    colour = mix(colour, vec3(0.34, 0.32, 0.31), smoothstep(0.5, 0.75, t));
+    colour = mix(colour, vec3(0.86, 0.89, 0.93), smoothstep(0.78, 0.92, t));
+    return mix(vec3(0.25, 0.22, 0.20), colour, smoothstep(0.45, 0.75, normal.y));
+}
+
+// Well separated hues for small integers.
+vec3 palette(uint k) {
+    vec3 hue = fract(float(k) * 0.61803399 + vec3(0.0, 0.3333333, 0.6666667));
+    return 0.15 + 0.65 * clamp(abs(hue * 6.0 - 3.0) - 1.0, 0.0, 1.0);
+}
+
+// Blue where the drawn surface is exact, green to red up to one pixel of error, white beyond.
+vec3 error_colour(float px) {
+    vec3 low = mix(vec3(0.02, 0.06, 0.30), vec3(0.05, 0.45, 0.10), smoothstep(0.0, 0.25, px));
+    vec3 high = mix(low, vec3(0.75, 0.06, 0.02), smoothstep(0.25, 1.0, px));
+    return px > 1.0 ? vec3(1.0) : high;
+}
+
+// Whether there is no land at a lattice position.
+bool is_open(vec2 lattice) {
+    return HOLES && in_hole(cell_at(lattice));
+}
+
+// Colour of the surface at a point relative to the eye over a lattice position relative to the anchor.
+vec3 land_colour(vec3 relative, vec2 lattice, uvec2 level_batch) {
+    Cell cell = cell_at(lattice);
+    float distance = length(relative);
+    float pixel = frame.pixel_slope * distance + frame.pixel_size;
+    vec3 normal = normal_at(lattice, pixel);
+    float height = (relative.y - frame.anchor_height_relative) + frame.anchor_height;
+
+    vec3 albedo;
+    if (COLOUR == 1) albedo = palette(level_batch.x);
+    else if (COLOUR == 2) albedo = texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
+    else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell)) / max(pixel, 1e-30));
+    else if (COLOUR == 5) albedo = palette(level_batch.y);
+    else albedo = tint(height, normal);
+
+    vec3 colour = albedo;
+    if (COLOUR == 4) {
+        colour = normal * 0.5 + 0.5;
+    } else {
+        float sun = max(dot(normal, frame.sun), 0.0);
+        vec3 ambient = mix(vec3(0.16, 0.15, 0.14), vec3(0.28, 0.34, 0.45), normal.y * 0.5 + 0.5);
+        colour *= sun * vec3(1.55, 1.42, 1.22) + ambient;
+    }
+    if (FOG) colour = mix(sky(relative / max(distance, 1e-30)), colour, exp(-frame.fog_density * distance));
+    return colour;
+}

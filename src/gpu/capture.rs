@@ -1,0 +1,209 @@
+//! The as-drawn mesh: what the vertex programs made of a draw list on the device.
+//!
+//! A variant of each vertex program (`CAPTURE` in `shaders/emit.glsl`) writes every vertex it places to a storage
+//! buffer, from the same buffers and through the same pipelines' input as when drawing. A list is captured in
+//! batches of parts, as many as the buffer holds.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+
+use super::device::Gpu;
+use super::frames::Recording;
+use super::memory::{Buffer, memory_barrier};
+use super::pipelines::{self, Pass};
+use super::terrain::Terrain;
+use crate::draw::layout::{Captured, CapturedPart};
+use crate::draw::{Draw, DrawList, Geometry, Source, Topology, expand};
+use crate::plan::ScenePlan;
+
+/// Triangles in a part of a draw.
+const PART: usize = 1 << 15;
+/// Records that the buffer holds: 1.4 million, 32 MiB.
+const RECORDS: usize = (32 << 20) / size_of::<Captured>();
+
+/// A part of a draw, and where its vertices go.
+pub struct Part {
+    /// The part.
+    pub draw: Draw,
+    /// Where its records lie in the buffer.
+    pub place: CapturedPart,
+}
+
+impl Part {
+    /// The record of an instance's vertex.
+    pub fn record(&self, instance: u32, index: u32) -> usize {
+        let (instance, vertex) = (instance - self.place.first_instance, index - self.place.first_vertex);
+        (self.place.base + instance * self.place.vertices + vertex) as usize
+    }
+
+    fn records(&self) -> usize {
+        self.draw.instances.len() * self.place.vertices as usize
+    }
+}
+
+/// Pipelines and the buffer.
+pub struct Capture {
+    gpu: Arc<Gpu>,
+    set_layout: vk::DescriptorSetLayout,
+    layout: vk::PipelineLayout,
+    pipelines: BTreeMap<(Source, Topology), vk::Pipeline>,
+    descriptors: vk::DescriptorPool,
+    set: vk::DescriptorSet,
+    /// The records: an array of [`Captured`].
+    pub buffer: Buffer,
+}
+
+impl Capture {
+    /// Makes what capturing a scene needs; `scene` is the layout of its descriptors.
+    pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout) -> Result<Self> {
+        if !gpu.captures {
+            bail!("{}: vertexPipelineStoresAndAtomics is missing: as-drawn capture needs it", gpu.candidate.name);
+        }
+        let bytes = (RECORDS * size_of::<Captured>()) as u64;
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let buffer = Buffer::new(gpu, "captured vertices", bytes, usage, MemoryLocation::GpuToCpu)?;
+        let kind = vk::DescriptorType::STORAGE_BUFFER;
+        let binding = [vk::DescriptorSetLayoutBinding::default()
+            .descriptor_type(kind)
+            .descriptor_count(1)
+            .stage_flags(vk::ShaderStageFlags::VERTEX)];
+        // SAFETY: the device is alive; Drop destroys what is made here.
+        let mut capture = unsafe {
+            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&binding);
+            let set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
+            let sets = [scene, set_layout];
+            let constants = [vk::PushConstantRange {
+                stage_flags: vk::ShaderStageFlags::VERTEX,
+                offset: 0,
+                size: size_of::<CapturedPart>() as u32,
+            }];
+            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&constants);
+            let layout = gpu.raw.create_pipeline_layout(&info, None)?;
+            let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: 1 }];
+            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+            let descriptors = gpu.raw.create_descriptor_pool(&info, None)?;
+            let sets = [set_layout];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&sets);
+            let set = gpu.raw.allocate_descriptor_sets(&info)?[0];
+            let whole = [vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }];
+            let write = vk::WriteDescriptorSet::default().dst_set(set).descriptor_type(kind).buffer_info(&whole);
+            gpu.raw.update_descriptor_sets(&[write], &[]);
+            let (gpu, pipelines) = (Arc::clone(gpu), BTreeMap::new());
+            Self { gpu, set_layout, layout, pipelines, descriptors, set, buffer }
+        };
+        for source in [Source::Lattice, Source::Resident] {
+            for topology in [Topology::Triangles, Topology::Strip] {
+                let pipeline = pipelines::terrain(gpu, capture.layout, plan, Pass::Capture, source, topology)?;
+                capture.pipelines.insert((source, topology), pipeline);
+            }
+        }
+        Ok(capture)
+    }
+
+    /// A list in batches whose vertices fit the buffer.
+    pub fn batches(resident: &Geometry, list: &DrawList) -> Result<Vec<Vec<Part>>> {
+        let mut batches: Vec<Vec<Part>> = Vec::new();
+        let mut used = RECORDS;
+        for draw in list.draws.iter().flat_map(|draw| draw.parts(PART)) {
+            let geometry = expand::geometry(draw.source, resident, list);
+            let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
+            let (first, last) = indices.iter().fold((u32::MAX, 0), |(low, high), &k| (low.min(k), high.max(k)));
+            let place = CapturedPart {
+                base: 0,
+                first_instance: draw.instances.start,
+                first_vertex: first,
+                vertices: last - first + 1,
+            };
+            for mut part in split(Part { draw, place }) {
+                let records = part.records();
+                if records > RECORDS {
+                    bail!("capture: one mesh of {records} vertices, at most {RECORDS} fit");
+                }
+                if used + records > RECORDS {
+                    batches.push(Vec::new());
+                    used = 0;
+                }
+                part.place.base = used as u32;
+                used += records;
+                batches.last_mut().expect("pushed at first").push(part);
+            }
+        }
+        Ok(batches)
+    }
+
+    /// Fills the buffer with what no vertex program writes (a height that is no number).
+    pub fn clear(&mut self) {
+        let size = self.buffer.size as usize;
+        self.buffer.write(0, &vec![0xff; size]);
+    }
+
+    /// Records the capture of a batch. The recording was prepared with the list it comes from.
+    pub fn record(&self, recording: &mut Recording, terrain: &Terrain, batch: &[Part]) -> Result<()> {
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: 1, height: 1 } };
+        let info = vk::RenderingInfo::default().render_area(area).layer_count(1);
+        let viewport = [vk::Viewport { width: 1.0, height: 1.0, max_depth: 1.0, ..Default::default() }];
+        recording.scope("capture", |r| {
+            let (raw, commands, graphics) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::GRAPHICS);
+            // SAFETY: what is bound outlives the frame; ranges lie in the bound buffers.
+            unsafe {
+                raw.cmd_begin_rendering(commands, &info);
+                raw.cmd_set_viewport(commands, 0, &viewport);
+                raw.cmd_set_scissor(commands, 0, &[area]);
+                let sets = [terrain.scene_set(r), self.set];
+                raw.cmd_bind_descriptor_sets(commands, graphics, self.layout, 0, &sets, &[]);
+                for Part { draw, place } in batch {
+                    let source = if draw.source == Source::Streamed { Source::Resident } else { draw.source };
+                    raw.cmd_bind_pipeline(commands, graphics, self.pipelines[&(source, draw.topology)]);
+                    terrain.bind_geometry(r, draw.source);
+                    let stage = vk::ShaderStageFlags::VERTEX;
+                    raw.cmd_push_constants(commands, self.layout, stage, 0, bytemuck::bytes_of(place));
+                    let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
+                    let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
+                    raw.cmd_draw_indexed(commands, indices, instances, first_index, 0, first_instance);
+                }
+                raw.cmd_end_rendering(commands);
+            }
+            Ok(())
+        })?;
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let written = (Stage::VERTEX_SHADER, Access::SHADER_STORAGE_WRITE);
+        let read = (Stage::HOST | Stage::COMPUTE_SHADER, Access::HOST_READ | Access::SHADER_STORAGE_READ);
+        memory_barrier(&self.gpu, recording.commands, written, read);
+        Ok(())
+    }
+
+    /// The records of a batch, once its frame has finished.
+    pub fn records(&self) -> &[Captured] {
+        bytemuck::cast_slice(&self.buffer.read()[..RECORDS * size_of::<Captured>()])
+    }
+}
+
+/// A part in pieces of instances that fit the buffer, if one instance does.
+fn split(part: Part) -> Vec<Part> {
+    let most = (RECORDS / part.place.vertices as usize).max(1);
+    let last = part.draw.instances.end;
+    let piece = |first: u32| Part {
+        draw: Draw { instances: first..last.min(first + most as u32), ..part.draw.clone() },
+        place: CapturedPart { first_instance: first, ..part.place },
+    };
+    part.draw.instances.clone().step_by(most).map(piece).collect()
+}
+
+impl Drop for Capture {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in use once the device is idle.
+        unsafe {
+            let _ = self.gpu.raw.device_wait_idle();
+            for pipeline in self.pipelines.values() {
+                self.gpu.raw.destroy_pipeline(*pipeline, None);
+            }
+            self.gpu.raw.destroy_pipeline_layout(self.layout, None);
+            self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
+            self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

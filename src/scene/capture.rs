@@ -1,0 +1,119 @@
+//! What a stage really drew: its triangles captured on the device, and their error found there.
+
+use anyhow::Result;
+
+use super::Stage;
+use crate::draw::expand::{self, Drawn};
+use crate::draw::layout::Captured;
+use crate::draw::{DrawList, Geometry};
+use crate::gpu::capture::{Capture, Part};
+use crate::gpu::oracle::{self, Oracle, Summary};
+use crate::height::surface::{Corner, Triangle, doubled_area};
+use crate::lod::Technique;
+use crate::view::View;
+
+/// A captured triangle: where it lies, and the positions that the rasteriser was given.
+#[derive(Clone, Copy, Debug)]
+pub struct AsDrawn {
+    /// The triangle, as [`expand`] says it.
+    pub drawn: Drawn,
+    /// Corners relative to the eye, metres.
+    pub relative: [[f32; 3]; 3],
+}
+
+impl Stage {
+    /// Every triangle of the last list that is not degenerate in plan, captured on the device for this view.
+    pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<Vec<AsDrawn>> {
+        let mut found = Vec::new();
+        let resident = technique.resident();
+        self.each_batch(resident, view, |_, batch, list, records| {
+            for part in batch {
+                let geometry = expand::geometry(part.draw.source, resident, list);
+                triangles(geometry, part, records, |drawn, corners| {
+                    let relative = corners.map(|k| records[k as usize].relative);
+                    found.push(AsDrawn { drawn, relative });
+                });
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    /// Vertical errors in metres and screen errors in pixels of the last list, captured and measured on the device:
+    /// single precision, for what is too big for [`crate::measure::geometric::errors`].
+    pub fn errors(&mut self, technique: &dyn Technique, view: &View) -> Result<[Summary; 2]> {
+        let resident = technique.resident();
+        let mut oracle: Option<Oracle> = None;
+        self.each_batch(resident, view, |stage, batch, list, records| {
+            if oracle.is_none() {
+                let capture = stage.capture.as_ref().expect("made before its first batch");
+                oracle = Some(Oracle::new(&stage.gpu, &stage.plan, stage.terrain.set_layout(), capture)?);
+            }
+            let oracle = oracle.as_mut().expect("just made");
+            let mut facing_up = Vec::new();
+            for part in batch {
+                let geometry = expand::geometry(part.draw.source, resident, list);
+                triangles(geometry, part, records, |drawn, [a, b, c]| {
+                    facing_up.push(if doubled_area(&drawn.corners) > 0 { [a, b, c] } else { [a, c, b] });
+                });
+            }
+            let frame = stage.look.frame(&stage.field, view, stage.range);
+            for some in facing_up.chunks(oracle::TRIANGLES) {
+                let mut recording = stage.frames.begin()?;
+                stage.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
+                let scene = stage.terrain.scene_set(&recording);
+                oracle.record(&mut recording, scene, view.size, some)?;
+                stage.frames.submit(None, None)?;
+                stage.frames.finish()?;
+                oracle.collect(some.len());
+            }
+            Ok(())
+        })?;
+        Ok(oracle.map_or([Summary::default(); 2], |oracle| oracle.summaries()))
+    }
+
+    /// Captures the last list batch by batch.
+    fn each_batch(
+        &mut self,
+        resident: &Geometry,
+        view: &View,
+        mut visit: impl FnMut(&mut Stage, &[Part], &DrawList, &[Captured]) -> Result<()>,
+    ) -> Result<()> {
+        if self.capture.is_none() {
+            self.capture = Some(Capture::new(&self.gpu, &self.plan, self.terrain.set_layout())?);
+        }
+        let mut list = std::mem::take(&mut self.list);
+        // They were made when the list was drawn.
+        list.uploads.clear();
+        let frame = self.look.frame(&self.field, view, self.range);
+        let batches = Capture::batches(resident, &list)?;
+        let visited = batches.iter().try_for_each(|batch| {
+            let capture = self.capture.as_mut().expect("made above");
+            capture.clear();
+            let mut recording = self.frames.begin()?;
+            self.terrain.prepare(&mut recording, &frame, &list)?;
+            capture.record(&mut recording, &self.terrain, batch)?;
+            self.frames.submit(None, None)?;
+            self.frames.finish()?;
+            let records = self.capture.as_ref().expect("made above").records().to_vec();
+            visit(self, batch, &list, &records)
+        });
+        self.list = list;
+        visited
+    }
+}
+
+/// Calls `visit` for every triangle of a part that is not degenerate, with the records of its corners.
+fn triangles(geometry: &Geometry, part: &Part, records: &[Captured], mut visit: impl FnMut(Drawn, [u32; 3])) {
+    let corner = |instance: u32, index: u32| {
+        let k = part.record(instance, index);
+        let Captured { position: [x, z], height, .. } = records[k];
+        (Corner { x, z, y: height }, k as u32)
+    };
+    expand::assemble(geometry, &part.draw, corner, |instance, corners: [(Corner, u32); 3]| {
+        let triangle: Triangle = corners.map(|(corner, _)| corner);
+        if doubled_area(&triangle) != 0 {
+            visit(Drawn { corners: triangle, instance }, corners.map(|(_, k)| k));
+        }
+    });
+}

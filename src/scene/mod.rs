@@ -1,0 +1,210 @@
+//! One field with one look on one device, drawn offscreen: pictures, draw lists and times for those who measure.
+
+pub mod capture;
+pub mod holes;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+
+use crate::draw::DrawList;
+use crate::gpu::frames::{Frames, Timing};
+use crate::gpu::target::{self, Offscreen};
+use crate::gpu::terrain::Terrain;
+use crate::gpu::{Gpu, capture::Capture, floor::Floor};
+use crate::height::Field;
+use crate::lod::Technique;
+use crate::plan::{Look, ScenePlan};
+use crate::view::View;
+
+/// What is drawn, and on what.
+#[derive(Clone)]
+pub struct Scene<'a> {
+    /// The device.
+    pub gpu: &'a Arc<Gpu>,
+    /// The field.
+    pub field: &'a Arc<Field>,
+    /// What the scene needs.
+    pub plan: &'a ScenePlan,
+    /// How it looks.
+    pub look: &'a Look,
+    /// The picture laid over it.
+    pub overlay: Option<&'a image::RgbaImage>,
+}
+
+/// A scene made ready on the device for one technique and one size of pictures.
+pub struct Stage {
+    frames: Frames,
+    terrain: Terrain,
+    floor: Option<Floor>,
+    capture: Option<Capture>,
+    offscreen: Offscreen,
+    gpu: Arc<Gpu>,
+    field: Arc<Field>,
+    plan: ScenePlan,
+    look: Look,
+    range: [f32; 2],
+    /// What was drawn last.
+    pub list: DrawList,
+}
+
+/// What one frame took, milliseconds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Times {
+    /// From the start of selection until the device has finished.
+    pub frame_ms: f64,
+    /// Selection.
+    pub select_ms: f64,
+    /// Writing the frame's data for the device and recording its uploads.
+    pub upload_ms: f64,
+    /// Recording the commands.
+    pub record_ms: f64,
+    /// The device, pass by pass.
+    pub gpu: Timing,
+}
+
+/// One picture and how it came about.
+pub struct Shot {
+    /// Colours; alpha says where land was drawn.
+    pub picture: image::RgbaImage,
+    /// What was drawn.
+    pub list: DrawList,
+    /// What it took; medians if it was drawn several times.
+    pub times: Times,
+    /// Device bytes in use while it was drawn.
+    pub device_bytes: u64,
+}
+
+/// What a frame copies back to the host after the device's work was timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Copy {
+    /// Nothing.
+    Nothing,
+    /// The colours: [`Stage::picture`].
+    Picture,
+    /// Colours and depth: [`Stage::depth`] too.
+    PictureAndDepth,
+}
+
+impl<'a> Scene<'a> {
+    /// Makes it ready for a technique.
+    pub fn stage(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
+        let (resident, limits) = (technique.resident(), technique.limits());
+        let formats = Offscreen::FORMATS;
+        let statistics = self.field.statistics();
+        Ok(Stage {
+            frames: Frames::new(self.gpu, self.plan.measured)?,
+            terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, resident, limits, formats)?,
+            floor: None,
+            capture: None,
+            offscreen: Offscreen::new(self.gpu, size)?,
+            gpu: Arc::clone(self.gpu),
+            field: Arc::clone(self.field),
+            plan: self.plan.clone(),
+            look: *self.look,
+            range: [statistics.min, statistics.max],
+            list: DrawList::default(),
+        })
+    }
+
+    /// Draws one view `times` times; the times are medians.
+    pub fn shoot(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
+        let mut stage = self.stage(technique, view.size)?;
+        let drawn = (0..times.max(1)).map(|_| stage.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
+        let device_bytes = self.gpu.device_bytes().values().sum();
+        Ok(Shot { picture: stage.picture(), list: stage.list, times: Times::median(drawn), device_bytes })
+    }
+}
+
+impl Stage {
+    /// Selects and draws a view, and waits until the device has finished.
+    pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
+        let started = Instant::now();
+        self.list.clear();
+        technique.select(view, &mut self.list);
+        let select_ms = ms(started);
+        let frame = self.look.frame(&self.field, view, self.range);
+        let mut recording = self.frames.begin()?;
+        let uploading = Instant::now();
+        self.terrain.prepare(&mut recording, &frame, &self.list)?;
+        let upload_ms = ms(uploading);
+        let recorded = Instant::now();
+        target::begin(&recording, self.offscreen.attachment(), Some(self.offscreen.kept_depth()));
+        self.terrain.draw(&mut recording, &self.list)?;
+        target::end(&recording);
+        if copy != Copy::Nothing {
+            self.offscreen.read_back(&recording);
+        }
+        if copy == Copy::PictureAndDepth {
+            self.offscreen.read_back_depth(&recording);
+        }
+        let record_ms = ms(recorded);
+        self.frames.submit(None, None)?;
+        self.frames.finish().context("drawing")?;
+        Ok(Times { frame_ms: ms(started), select_ms, upload_ms, record_ms, gpu: self.frames.timing.clone() })
+    }
+
+    /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed
+    /// the depth that the last frame left. `view` is that frame's.
+    pub fn draw_floor(&mut self, view: &View, copy: Copy) -> Result<Times> {
+        if self.floor.is_none() {
+            let layout = self.terrain.set_layout();
+            self.floor = Some(Floor::new(&self.gpu, &self.plan, layout, &self.offscreen)?);
+        }
+        let floor = self.floor.as_ref().expect("just made");
+        let frame = self.look.frame(&self.field, view, self.range);
+        let started = Instant::now();
+        let mut recording = self.frames.begin()?;
+        self.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
+        let upload_ms = ms(started);
+        let recorded = Instant::now();
+        let scene = self.terrain.scene_set(&recording);
+        floor.draw(&mut recording, &self.offscreen, scene)?;
+        if copy != Copy::Nothing {
+            self.offscreen.read_back(&recording);
+        }
+        let record_ms = ms(recorded);
+        self.frames.submit(None, None)?;
+        self.frames.finish().context("drawing the floor")?;
+        Ok(Times { frame_ms: ms(started), select_ms: 0.0, upload_ms, record_ms, gpu: self.frames.timing.clone() })
+    }
+
+    /// The last frame's colours, if it copied them; alpha says where land was drawn.
+    pub fn picture(&self) -> image::RgbaImage {
+        self.offscreen.picture()
+    }
+
+    /// The last frame's depth, row by row from the top, if it copied it: near plane distance over distance along
+    /// the view axis in a perspective view, 0 where there is no land.
+    pub fn depth(&self) -> Vec<f32> {
+        self.offscreen.depth_values()
+    }
+}
+
+impl Times {
+    /// Each time's median; the passes are those of the frame with the median device time.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub fn median(mut frames: Vec<Times>) -> Times {
+        frames.sort_by(|a, b| a.gpu.total_ms.total_cmp(&b.gpu.total_ms));
+        let of = |time: fn(&Times) -> f64| median(frames.iter().map(time).collect());
+        Times {
+            frame_ms: of(|t| t.frame_ms),
+            select_ms: of(|t| t.select_ms),
+            upload_ms: of(|t| t.upload_ms),
+            record_ms: of(|t| t.record_ms),
+            gpu: frames[frames.len() / 2].gpu.clone(),
+        }
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,100 @@
+//! What the device really drew: captured triangles against their expansion, the device's oracle against the exact
+//! one, and the floor's picture against the frame it stands for.
+
+use std::sync::Arc;
+
+use cuesta::draw::expand;
+use cuesta::draw::layout::Frame;
+use cuesta::draw::place::relative_position;
+use cuesta::gpu::Gpu;
+use cuesta::height::{Field, synth};
+use cuesta::lod::Technique;
+use cuesta::measure::geometric;
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::view::View;
+
+use super::neck::{Explicit, Way};
+use super::{as_f32, aslant, difference, mountains, on_device, technique};
+
+fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Stage {
+    let look = Look::default();
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+    let mut stage = Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, view.size).unwrap();
+    stage.draw(technique, view, Copy::PictureAndDepth).unwrap();
+    stage
+}
+
+fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn Technique) {
+    let view = aslant(field, [160, 100], 2.0);
+    let mut stage = stage(gpu, field, technique, &view);
+    let captured = stage.capture(technique, &view).unwrap();
+    let frame = Frame::placing(field, &view);
+    let expanded = expand::triangles(field, &frame, technique.resident(), &stage.list);
+    assert_eq!(captured.len(), expanded.len(), "{name}");
+    let bits = |t: &expand::Drawn| (t.instance, t.corners.map(|c| (c.x, c.z, c.y.to_bits())));
+    for (there, here) in captured.iter().zip(&expanded) {
+        assert_eq!(bits(&there.drawn), bits(here), "{name}: {there:?} {here:?}");
+        let relative = here.corners.map(|c| relative_position(&frame, [c.x, c.z], c.y).map(f32::to_bits));
+        assert_eq!(there.relative.map(|corner| corner.map(f32::to_bits)), relative, "{name}: {there:?}");
+    }
+}
+
+#[test]
+fn as_drawn_is_as_expanded_to_the_bit() {
+    on_device(|gpu| {
+        let land = Arc::new(synth::synth(synth::Kind::Fractal, [513, 400], 9));
+        for field in [mountains(), as_f32(&mountains()), land] {
+            let rooms = [("brute-force", &[][..]), ("geomipmap", &[]), ("geomipmap", &["block=17", "morph=on"])];
+            for (name, settings) in rooms {
+                compare(gpu, &field, name, technique(&field, name, settings).as_mut());
+            }
+        }
+        let field = mountains();
+        for way in [Way::Resident, Way::Streamed, Way::Uploaded, Way::Strips] {
+            compare(gpu, &field, &format!("{way:?}"), &mut Explicit::new(&field, way));
+        }
+    });
+}
+
+#[test]
+fn the_devices_oracle_agrees_with_the_exact_one() {
+    on_device(|gpu| {
+        let land = Arc::new(synth::synth(synth::Kind::Fractal, [700, 513], 3));
+        for (field, px) in [(mountains(), 1.0), (as_f32(&mountains()), 6.0), (Arc::clone(&land), 2.0), (land, 12.0)] {
+            let view = aslant(&field, [640, 400], px);
+            let mut technique = technique(&field, "geomipmap", &["block=33"]);
+            let mut stage = stage(gpu, &field, technique.as_mut(), &view);
+            let there = stage.errors(technique.as_ref(), &view).unwrap();
+            let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
+            for (there, here) in there.into_iter().zip([here.vertical_m, here.screen_px]) {
+                let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
+                assert!(here.max > 0.0 && here.count > 5000, "{here:?}");
+                // Samples within rounding of the picture's border may be in or out.
+                assert!(near(there.count as f64, here.count as f64, 1e-3), "{there:?} {here:?}");
+                assert!(near(there.max, here.max, 1e-5), "{there:?} {here:?}");
+                assert!(near(there.rms, here.rms, 1e-3), "{there:?} {here:?}");
+                assert!((here.p999 * 0.999..=here.p999 * 1.064).contains(&there.p999), "{there:?} {here:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn the_floor_shows_what_the_frame_showed() {
+    on_device(|gpu| {
+        for field in [mountains(), as_f32(&mountains())] {
+            let view = aslant(&field, [320, 200], 0.5);
+            let mut technique = technique(&field, "brute-force", &[]);
+            let mut stage = stage(gpu, &field, technique.as_mut(), &view);
+            let (drawn, depth) = (stage.picture(), stage.depth());
+            let covered = |p: &image::Rgba<u8>| p.0[3] > 0;
+            assert!(drawn.pixels().zip(&depth).all(|(p, &d)| covered(p) == (d > 0.0)), "land is where depth is");
+            let times = stage.draw_floor(&view, Copy::Picture).unwrap();
+            let floor = stage.picture();
+            let (largest, share) = difference(&drawn, &floor, 6);
+            assert!(share < 0.002, "{largest} at worst, {share} of the pixels differ");
+            assert_eq!(times.gpu.passes.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["floor"]);
+        }
+    });
+}
