@@ -19,7 +19,8 @@ use crate::lod::Technique;
 use crate::measure::geometric::{self, Summary};
 use crate::measure::watertight;
 use crate::plan::ScenePlan;
-use crate::scene::{Scene, Shot, holes};
+use crate::scene::holes::Truth;
+use crate::scene::{Scene, Shot};
 use crate::view::{Metric, View};
 
 /// Arguments.
@@ -130,7 +131,8 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;
     let measured = if args.measure { Some(measure(&scene, technique.as_ref(), &view, &shot)?) } else { None };
-    let messages = gpu.messages();
+    let device = gpu.candidate.name.clone();
+    let messages = Gpu::close(gpu);
     let missed = measured.as_ref().is_some_and(|m| {
         let over = technique.keeps_tolerance()
             && view.tolerance.metric == Metric::Certified
@@ -142,7 +144,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         metric: if view.tolerance.metric == Metric::Certified { "certified" } else { "paper" },
         tolerance_px: view.tolerance.px,
         size: view.size,
-        device: gpu.candidate.name.clone(),
+        device,
         triangles: shot.list.triangles(),
         vertices: shot.times.gpu.statistics.map(|s| s[0]),
         draws: shot.list.draws.len(),
@@ -178,7 +180,7 @@ fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -
         expand::triangles(scene.field, &Frame::placing(scene.field, view), technique.resident(), &shot.list);
     let proof = watertight::prove(scene.field, &view.frustum(), &triangles);
     drop(triangles);
-    let holes = holes::hole_pixels(scene, view, shot)?;
+    let holes = Truth::new(scene, view)?.hole_pixels(view, &shot.picture);
     let width = view.size[0] as usize;
     Ok(Measured {
         error_px: errors.screen_px.into(),

@@ -276,9 +276,13 @@ impl Gpu {
         self.bytes.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// What the validation layers have said so far.
-    pub fn messages(&self) -> Vec<String> {
-        self.instance.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    /// Gives the device up, of which nothing is in use any more: what the validation layers have said, the device's
+    /// end included.
+    pub fn close(gpu: Arc<Self>) -> Vec<String> {
+        let instance = Arc::clone(&gpu.instance);
+        drop(gpu);
+        let messages = instance.messages.lock().unwrap_or_else(|e| e.into_inner());
+        messages.clone()
     }
 
     /// Waits until the device has nothing to do.

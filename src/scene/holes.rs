@@ -4,27 +4,42 @@ use std::sync::Arc;
 
 use anyhow::Result;
 
-use super::{Scene, Shot};
+use super::Scene;
 use crate::height::Field;
 use crate::lod::{self, Settings, Technique};
 use crate::measure::picture;
 use crate::view::View;
 
-/// Pixels, row by row, of a picture that are open although land covers all of their neighbourhood in the truth,
-/// drawn by brute force. Where samples have no data, land within the tolerance of the truth may show what the
-/// truth just hides: pixels that missing land projects to do not count.
-pub fn hole_pixels(scene: &Scene, view: &View, shot: &Shot) -> Result<Vec<usize>> {
-    let (width, radius) = (view.size[0] as usize, picture::outline_radius(view.tolerance.px));
-    let truth = covered(&brute_force(scene, scene.field, view)?);
-    let mut holes = picture::hole_pixels(&covered(&shot.picture), &truth, width, radius);
-    if scene.field.holes().count() > 0 {
-        let missing = picture::widened(&missing_land(scene, view)?, width, radius);
-        holes.retain(|&k| !missing[k]);
-    }
-    Ok(holes)
+/// A view as brute force draws it: what other pictures of the view are held against.
+pub struct Truth {
+    /// Its picture; alpha says where land is.
+    pub picture: image::RgbaImage,
+    /// Pixels that land without data projects to, if there is such land.
+    missing: Option<Vec<bool>>,
 }
 
-/// Pixels that land without data projects to.
+impl Truth {
+    /// Draws it.
+    pub fn new(scene: &Scene, view: &View) -> Result<Self> {
+        let picture = brute_force(scene, scene.field, view)?;
+        let has_holes = scene.field.holes().count() > 0;
+        Ok(Self { picture, missing: has_holes.then(|| missing_land(scene, view)).transpose()? })
+    }
+
+    /// Pixels, row by row, of a picture of the same view that are open although land covers all of their
+    /// neighbourhood in the truth. Where samples have no data, land within the tolerance of the truth may show what
+    /// the truth just hides: pixels that missing land projects to do not count.
+    pub fn hole_pixels(&self, view: &View, picture: &image::RgbaImage) -> Vec<usize> {
+        let (width, radius) = (view.size[0] as usize, picture::outline_radius(view.tolerance.px));
+        let mut holes = picture::hole_pixels(&covered(picture), &covered(&self.picture), width, radius);
+        if let Some(missing) = &self.missing {
+            let missing = picture::widened(missing, width, radius);
+            holes.retain(|&k| !missing[k]);
+        }
+        holes
+    }
+}
+
 fn missing_land(scene: &Scene, view: &View) -> Result<Vec<bool>> {
     let missing = Arc::new(scene.field.around_holes());
     let mut mask = covered(&brute_force(scene, &missing, view)?);
@@ -38,12 +53,12 @@ fn missing_land(scene: &Scene, view: &View) -> Result<Vec<bool>> {
     Ok(mask)
 }
 
-fn covered(picture: &image::RgbaImage) -> Vec<bool> {
+/// Where land was drawn, pixel by pixel.
+pub fn covered(picture: &image::RgbaImage) -> Vec<bool> {
     picture.pixels().map(|p| p.0[3] > 0).collect()
 }
 
-/// A field as all of its triangles draw it.
-pub fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::RgbaImage> {
+fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::RgbaImage> {
     let entry = lod::find("brute-force").expect("in the table");
     let mut technique: Box<dyn Technique> = (entry.build)(Arc::clone(field), &Settings::defaults(entry));
     Ok(Scene { field, ..scene.clone() }.shoot(technique.as_mut(), view, 1)?.picture)
