@@ -19,6 +19,7 @@
 //! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
 
 mod edges;
+pub mod plan;
 mod sweep;
 
 use std::io::{self, Write};

@@ -66,6 +66,97 @@ impl Window {
 
     /// Where a corner lies in the picture, pixels.
     fn at(&self, corner: &Corner) -> [f64; 2] {
-        [corner.x, corner.z].map(f64::from).iter().zip(self.first).map(|(n, first)| (n - first) * self.px_per_cell).collect::<Vec<_>>()[..].try_into().expect("two")
+        let along = |n: i32, first: f64| (f64::from(n) - first) * self.px_per_cell;
+        [along(corner.x, self.first[0]), along(corner.z, self.first[1])]
+    }
+
+    /// The pixels, along x and along y, in which a box around points lies.
+    fn pixels(points: &[[f64; 2]]) -> [std::ops::Range<u32>; 2] {
+        [0, 1].map(|k| {
+            let low = points.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min);
+            let high = points.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max);
+            // Casts of what lies outside stop at 0.
+            (low.floor() as u32).min(SIZE)..(high.ceil() as u32).min(SIZE)
+        })
+    }
+
+    fn meets(&self, triangle: &Triangle) -> bool {
+        Self::pixels(&triangle.each_ref().map(|c| self.at(c))).iter().all(|range| !range.is_empty())
+    }
+
+    /// Colours the pixels whose centres lie in a triangle by what is there.
+    fn fill(&self, picture: &mut RgbImage, triangle: &Triangle, colour: impl Fn(Rgb<u8>) -> Rgb<u8>) {
+        let corners = triangle.each_ref().map(|c| self.at(c));
+        let turn = doubled_area(triangle).signum() as f64;
+        let [columns, rows] = Self::pixels(&corners);
+        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+            let centre = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            let is_left = |k: usize| {
+                let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                let cross = (q[1] - p[1]) * (centre[0] - p[0]) - (q[0] - p[0]) * (centre[1] - p[1]);
+                cross * turn >= 0.0
+            };
+            if (0..3).all(is_left) {
+                let pixel = picture.get_pixel_mut(x, y);
+                *pixel = colour(*pixel);
+            }
+        }
+    }
+
+    fn outline(&self, picture: &mut RgbImage, triangle: &Triangle, colour: Rgb<u8>, radius: i32) {
+        (0..3).for_each(|k| self.line(picture, [&triangle[k], &triangle[(k + 1) % 3]], colour, radius));
+    }
+
+    /// A line of square dots, `radius` pixels to each side.
+    fn line(&self, picture: &mut RgbImage, ends: [&Corner; 2], colour: Rgb<u8>, radius: i32) {
+        let [from, to] = ends.map(|corner| self.at(corner));
+        let steps = (to[0] - from[0]).abs().max((to[1] - from[1]).abs()).ceil().max(1.0);
+        let dots = (0..=steps as i32).map(|k| f64::from(k) / steps);
+        for [x, y] in dots.map(|t| [0, 1].map(|k| (from[k] + (to[k] - from[k]) * t).floor() as i32)) {
+            let around = (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| [x, y]));
+            for [x, y] in around.filter(|at| at.iter().all(|n| (0..SIZE as i32).contains(n))) {
+                picture.put_pixel(x as u32, y as u32, colour);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(corners: [[i32; 2]; 3]) -> Triangle {
+        corners.map(|[x, z]| Corner { x, z, y: 0.0 })
+    }
+
+    fn example(kind: Kind, triangles: Vec<Triangle>) -> CounterExample {
+        CounterExample { kind, triangles, text: String::new() }
+    }
+
+    /// The colour at a lattice position, for pictures of a window of 16 cells from (−4, −4).
+    fn at(picture: &RgbImage, x: f64, z: f64) -> Rgb<u8> {
+        let px = |n: f64| ((n + 4.0) * 32.0) as u32;
+        *picture.get_pixel(px(x), px(z))
+    }
+
+    #[test]
+    fn every_triangle_is_where_it_lies() {
+        let (west, east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
+        let drawn = [west, east].map(|corners| Drawn { corners, instance: 0 });
+        let shown = picture(&drawn, &example(Kind::Overlap, vec![west]));
+        assert_eq!((at(&shown, 2.0, 5.0), at(&shown, 5.0, 2.0), at(&shown, -2.0, 5.0)), (FAULT, LAND, GROUND));
+        assert_eq!((at(&shown, 4.0, 4.0), at(&shown, 8.0, 4.0)), (FAULT_EDGE, EDGE));
+        let twice = picture(&drawn, &example(Kind::Overlap, vec![west, west]));
+        assert_eq!((at(&twice, 2.0, 5.0), at(&twice, 5.0, 2.0)), (FAULT_TWICE, LAND));
+        let gap = picture(&drawn[1..], &example(Kind::Gap, vec![west]));
+        assert_eq!((at(&gap, 2.0, 5.0), at(&gap, 5.0, 2.0)), (MISSING, LAND));
+    }
+
+    #[test]
+    fn the_vertex_with_two_heights_is_marked() {
+        let (west, mut east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
+        east[1].y = 1.0;
+        let shown = picture(&[], &example(Kind::Crack, vec![west, east]));
+        assert_eq!((at(&shown, 8.0, 8.0), at(&shown, 0.0, 0.0)), (VERTEX, FAULT_EDGE));
     }
 }
