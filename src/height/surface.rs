@@ -3,10 +3,12 @@
 
 use std::ops::RangeInclusive;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Field, rtin};
 
 /// A corner of a drawn triangle: lattice position (finest samples) and height, metres.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Corner {
     /// East.
     pub x: i32,

@@ -19,11 +19,13 @@
 //! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
 
 mod edges;
+pub mod plan;
 mod sweep;
 
 use std::io::{self, Write};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::draw::expand::Drawn;
 use crate::height::Field;
@@ -31,7 +33,7 @@ use crate::height::surface::{Corner, Triangle, doubled_area};
 use crate::view::Frustum;
 
 /// What is wrong with a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Kind {
     /// A corner lies outside the field.
     Outside,
@@ -48,7 +50,7 @@ pub enum Kind {
 }
 
 /// The fewest triangles that show what is wrong.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CounterExample {
     /// What is wrong.
     pub kind: Kind,
@@ -70,7 +72,7 @@ impl std::fmt::Display for CounterExample {
 impl std::error::Error for CounterExample {}
 
 /// What was proven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Proof {
     /// Triangles.
     pub triangles: usize,

@@ -1,0 +1,298 @@
+//! What triangles cost: how many there are, how many of them show, and how large they are on the screen.
+//!
+//! A triangle's size is the exact area of its projection, clipped to the picture; what other land hides of it
+//! is not taken off.
+
+use glam::DVec4;
+use serde::{Deserialize, Serialize};
+
+use super::each_part;
+use super::histogram::Histogram;
+use crate::draw::expand;
+use crate::draw::layout::Frame;
+use crate::draw::{Draw, DrawList, Geometry};
+use crate::height::Field;
+use crate::height::surface::Triangle;
+use crate::view::View;
+
+/// Powers of two, px², between which the histogram has its bins: from 1/256 px² to more than any picture has.
+const BINS: [i32; 2] = [-8, 24];
+
+/// The triangles of a list in a view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Economy {
+    /// Triangles submitted.
+    pub triangles: u64,
+    /// Of these, those without area in plan.
+    pub degenerate: u64,
+    /// Those wholly outside the picture.
+    pub outside: u64,
+    /// Those at least partly in the picture that face away from the eye or are seen edge-on.
+    pub facing_away: u64,
+    /// The rest: at least partly in the picture, facing the eye.
+    pub shown: u64,
+    /// Of the shown, the share with less than 1 px² in the picture; 0 if none is shown.
+    pub sub_pixel_share: f64,
+    /// Area of all shown triangles in the picture, pixels.
+    pub area_px: f64,
+    /// The shown triangles by their area in the picture, pixels: bins from 2^−8 to 2^24.
+    pub sizes_px: Histogram,
+}
+
+/// Fragments for each covered pixel, given how many the device ran and how many pixels they cover; `None` if no
+/// pixel is covered.
+pub fn overdraw(fragments: u64, covered_pixels: u64) -> Option<f64> {
+    (covered_pixels > 0).then(|| fragments as f64 / covered_pixels as f64)
+}
+
+/// Measures the triangles of a list.
+pub fn economy(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Economy {
+    let screen = Screen::new(field, view);
+    let mut total = Economy::new();
+    each_part(list, |part| screen.part(resident, list, part), |part| total.merge(&part));
+    total.triangles = list.triangles();
+    total.degenerate = total.triangles - total.outside - total.facing_away - total.shown;
+    let sub_pixel: u64 = (0..).zip(&total.sizes_px.counts).filter(|&(k, _)| total.is_sub_pixel(k)).map(|b| b.1).sum();
+    total.sub_pixel_share = sub_pixel as f64 / total.shown.max(1) as f64;
+    total
+}
+
+impl Economy {
+    fn new() -> Self {
+        Self {
+            triangles: 0,
+            degenerate: 0,
+            outside: 0,
+            facing_away: 0,
+            shown: 0,
+            sub_pixel_share: 0.0,
+            area_px: 0.0,
+            sizes_px: Histogram::new(BINS[0], BINS[1]),
+        }
+    }
+
+    /// Whether a bin of sizes ends at 1 px² or below.
+    fn is_sub_pixel(&self, bin: usize) -> bool {
+        self.sizes_px.begin(bin) < 1.0
+    }
+
+    fn merge(&mut self, part: &Economy) {
+        self.outside += part.outside;
+        self.facing_away += part.facing_away;
+        self.shown += part.shown;
+        self.area_px += part.area_px;
+        self.sizes_px.merge(&part.sizes_px);
+    }
+
+    /// Counts a triangle by its signed area in the picture; `None` if it has no part in it.
+    fn add(&mut self, area_px: Option<f64>) {
+        match area_px {
+            None => self.outside += 1,
+            Some(area) if area > 0.0 => {
+                self.shown += 1;
+                self.area_px += area;
+                self.sizes_px.add(area);
+            }
+            Some(_) => self.facing_away += 1,
+        }
+    }
+}
+
+/// What triangles are projected with.
+struct Screen<'a> {
+    field: &'a Field,
+    view: &'a View,
+    frame: Frame,
+    clip_from_relative: glam::DMat4,
+}
+
+impl<'a> Screen<'a> {
+    fn new(field: &'a Field, view: &'a View) -> Self {
+        Self { field, view, frame: Frame::placing(field, view), clip_from_relative: view.clip_from_relative() }
+    }
+
+    fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Economy {
+        let mut economy = Economy::new();
+        expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle| {
+            economy.add(self.area_px(&triangle.corners));
+        });
+        economy
+    }
+
+    /// The area, pixels, that a triangle has in the picture, negative if it faces away; `None` if it lies outside.
+    fn area_px(&self, triangle: &Triangle) -> Option<f64> {
+        let corners = triangle.map(|corner| {
+            let point = self.field.world_at(corner.x.into(), corner.z.into(), corner.y.into());
+            self.clip_from_relative * (point - self.view.eye).extend(1.0)
+        });
+        let [w, h] = self.view.size.map(f64::from);
+        // Two units of clip space across the picture; its y points down, which turns the sense round.
+        clipped(corners).map(|polygon| -signed_area(&polygon) * w * h / 4.0)
+    }
+}
+
+/// How far inside the sides, the near and the far plane a point of clip space is (depth reversed).
+fn inside(p: DVec4) -> [f64; 6] {
+    [p.w - p.x, p.w + p.x, p.w - p.y, p.w + p.y, p.w - p.z, p.z]
+}
+
+/// The part of a triangle in the picture (Sutherland and Hodgman 1974, in homogeneous coordinates); `None` if
+/// there is none.
+fn clipped(corners: [DVec4; 3]) -> Option<Vec<DVec4>> {
+    let inner = corners.map(inside);
+    if (0..6).any(|plane| inner.iter().all(|corner| corner[plane] <= 0.0)) {
+        return None;
+    }
+    let mut polygon = corners.to_vec();
+    for plane in (0..6).filter(|&plane| inner.iter().any(|corner| corner[plane] < 0.0)) {
+        polygon = cut(&polygon, plane);
+    }
+    (polygon.len() >= 3).then_some(polygon)
+}
+
+/// The part of a polygon on the inner side of a plane.
+fn cut(polygon: &[DVec4], plane: usize) -> Vec<DVec4> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (k, &to) in polygon.iter().enumerate() {
+        let from = polygon[(k + polygon.len() - 1) % polygon.len()];
+        let [a, b] = [from, to].map(|p| inside(p)[plane]);
+        if (a < 0.0) != (b < 0.0) {
+            kept.push(from + (to - from) * (a / (a - b)));
+        }
+        if b >= 0.0 {
+            kept.push(to);
+        }
+    }
+    kept
+}
+
+/// Area of a polygon of clip space once divided by w, positive if it runs anticlockwise with y up.
+fn signed_area(polygon: &[DVec4]) -> f64 {
+    let flat = |p: DVec4| [p.x / p.w, p.y / p.w];
+    let origin = flat(polygon[0]);
+    let from_origin = |p: &DVec4| [flat(*p)[0] - origin[0], flat(*p)[1] - origin[1]];
+    let cross = |[a, b]: &[DVec4; 2]| {
+        let ([ax, ay], [bx, by]) = (from_origin(a), from_origin(b));
+        ax * by - ay * bx
+    };
+    polygon.array_windows().map(cross).sum::<f64>() / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::{ExplicitVertex, Instance, Source, Topology};
+    use crate::height::{Holes, Samples};
+    use crate::view::{Lens, Metric, Tolerance};
+    use glam::DVec3;
+
+    const SIDE: i32 = 64;
+
+    fn field() -> Field {
+        let count = ((SIDE + 1) * (SIDE + 1)) as usize;
+        Field::new(Samples::F32(vec![0.0; count]), [SIDE as u32 + 1; 2], [1.0, 1.0], Holes::none(count))
+    }
+
+    fn list(corners: &[([i32; 2], f32)]) -> DrawList {
+        let vertex = |&(position, height): &([i32; 2], f32)| ExplicitVertex { position, height, ..Default::default() };
+        let mut list = DrawList { instances: vec![Instance::default()], ..DrawList::default() };
+        list.streamed.vertices = corners.iter().map(vertex).collect();
+        list.streamed.indices = (0..corners.len() as u32).collect();
+        list.draws.push(Draw {
+            source: Source::Streamed,
+            topology: Topology::Triangles,
+            indices: 0..corners.len() as u32,
+            instances: 0..1,
+        });
+        list
+    }
+
+    /// From straight above, 4 px a metre: `width` metres around (x, z).
+    fn above(x: f64, z: f64, width: u32) -> View {
+        View {
+            eye: DVec3::new(x, 100.0, z),
+            world_from_eye: View::turned(-90.0, -90.0, 0.0),
+            lens: Lens::Orthographic { width: f64::from(width), far: 1e3 },
+            size: [4 * width, 4 * width],
+            near: 1.0,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        }
+    }
+
+    fn measure(view: &View, corners: &[([i32; 2], f32)]) -> Economy {
+        economy(&field(), view, &Geometry::default(), &list(corners))
+    }
+
+    #[test]
+    fn areas_are_exact_and_clipped_to_the_picture() {
+        let half_field = [([0, 0], 0.0), ([0, SIDE], 0.0), ([SIDE, 0], 0.0)];
+        let whole = measure(&above(32.0, 32.0, 100), &half_field);
+        assert_eq!((whole.triangles, whole.shown, whole.outside, whole.facing_away), (1, 1, 0, 0));
+        assert!((whole.area_px - 64.0 * 64.0 / 2.0 * 16.0).abs() < 1e-6, "{whole:?}");
+        // A window of 8 m whose upper left half lies on the triangle.
+        let part = measure(&above(32.0, 32.0, 8), &half_field);
+        assert!((part.area_px - 8.0 * 8.0 / 2.0 * 16.0).abs() < 1e-6, "{part:?}");
+        assert_eq!(part.sizes_px.counts.iter().position(|&n| n == 1), Some(8 + 9 + 1), "512 px²");
+        assert_eq!(measure(&above(60.0, 60.0, 4), &half_field).outside, 1);
+    }
+
+    #[test]
+    fn what_faces_away_or_has_no_area_shows_nothing() {
+        let corners = [
+            ([0, 0], 0.0),
+            ([8, 0], 0.0),
+            ([0, 8], 0.0), // Turned over.
+            ([3, 3], 0.0),
+            ([3, 3], 0.0),
+            ([9, 9], 1.0), // Degenerate in plan.
+            ([20, 20], 0.0),
+            ([20, 21], 0.0),
+            ([21, 20], 0.0), // 8 px².
+        ];
+        let found = measure(&above(32.0, 32.0, 100), &corners);
+        assert_eq!([found.triangles, found.degenerate, found.facing_away, found.shown, found.outside], [3, 1, 1, 1, 0]);
+        // From below everything is the other way round.
+        let mut below = above(32.0, 32.0, 100);
+        below.eye.y = -100.0;
+        below.world_from_eye = View::turned(-90.0, 90.0, 0.0);
+        let found = measure(&below, &corners);
+        assert_eq!([found.facing_away, found.shown], [1, 1]);
+        assert!((found.area_px - 32.0 * 16.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_triangle_through_the_near_plane_is_cut_there() {
+        let mut view = above(32.0, 32.0, 100);
+        (view.lens, view.size) = (Lens::Perspective { fov_x: 2.0 }, [100, 100]);
+        (view.eye, view.world_from_eye) = (DVec3::new(32.0, 5.0, 32.0), View::turned(-90.0, 0.0, 0.0));
+        let (a, b, c, d) = (([0, 0], 0.0), ([0, SIDE], 0.0), ([SIDE, 0], 0.0), ([SIDE, SIDE], 0.0));
+        let found = measure(&view, &[a, b, c, c, b, d]);
+        // A floor 5 m below, 32 m to each side: it ends below the horizon, and further away than where 32 m are
+        // half the picture it leaves a corner open on each side.
+        let focal = view.focal_px();
+        let below_horizon = |distance: f64| focal * 5.0 / distance;
+        let corner = (50.0 - focal) * (below_horizon(32.0 * focal / 50.0) - below_horizon(32.0)) / 2.0;
+        let expected = 100.0 * (50.0 - below_horizon(32.0)) - 2.0 * corner;
+        assert!((found.area_px - expected).abs() < 1e-6, "{found:?}, expected {expected}");
+    }
+
+    /// Triangles of the size of a pixel and below, in a picture that covers them all: their areas add up, and their
+    /// share is counted.
+    #[test]
+    fn sub_pixel_triangles_are_counted() {
+        let cell = |x: i32, size: i32| [([x, 0], 0.0), ([x, size], 0.0), ([x + size, 0], 0.0)];
+        let corners: Vec<_> = [cell(0, 1), cell(2, 2), cell(6, 1), cell(8, 4)].concat();
+        let mut view = above(32.0, 32.0, 100);
+        // 1 px a metre: areas 1/2, 2, 1/2 and 8 px².
+        view.size = [100, 100];
+        let found = measure(&view, &corners);
+        assert_eq!((found.shown, found.sub_pixel_share), (4, 0.5));
+        assert!((found.area_px - 11.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn overdraw_is_a_ratio() {
+        assert_eq!(overdraw(300, 200), Some(1.5));
+        assert_eq!(overdraw(0, 0), None);
+    }
+}

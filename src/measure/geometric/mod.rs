@@ -1,0 +1,214 @@
+//! How far the as-drawn triangles are from the samples: vertically in metres, and on the screen in pixels.
+//!
+//! Measured is every sample with data inside or on the border of a drawn triangle, if the drawn point above
+//! or below it is in view. The screen error is exact: both end points of the vertical difference are projected
+//! in f64. The near plane only says what is drawn: a true point that lies before it is projected through the
+//! pinhole all the same, and only at or behind the eye, where it has no image, is the error infinite. (The
+//! certified metric bounds the error of such points too, see [`View::allowed_error`].)
+//!
+//! Each sample counts once: of the triangles around a sample, the one on its south-east side (at the field's
+//! last column and row, on its west and north side) counts it, chosen exactly on the integers. A sample at the
+//! south or east border of the drawn land inside the field, which has no such triangle, counts towards the
+//! maximum only; every triangle does.
+
+mod silhouette;
+
+use serde::{Deserialize, Serialize};
+
+use self::silhouette::Silhouette;
+use super::summary::Tally;
+pub use super::summary::{Place, Summary};
+use super::{each_part, facing_up, in_view};
+use crate::draw::expand::{self, Drawn};
+use crate::draw::layout::Frame;
+use crate::draw::{Draw, DrawList, Geometry};
+use crate::height::Field;
+use crate::height::surface::{self, Corner, Triangle, doubled_area};
+use crate::view::{Aabb, Containment, Frustum, Lens, View};
+use glam::DVec3;
+
+/// Bins of the angle off the view axis, 10° each: a perspective picture ends before 90°.
+pub const ANGLES: usize = 9;
+
+/// What [`errors`] finds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Drawn surface − sample, absolute, metres.
+    pub vertical_m: Summary,
+    /// The same difference on the screen, pixels.
+    pub screen_px: Summary,
+    /// Share of the samples counted in `screen_px` whose error is at most the view's tolerance; 1 if there are
+    /// none.
+    pub bound_kept: f64,
+    /// The screen error of the samples in the silhouette band alone, pixels: of the four triangles that such a
+    /// sample makes with a neighbour along x and one along z, some face the eye and some do not.
+    pub silhouette_px: Summary,
+    /// Screen error ÷ the view's tolerance, by the angle of the drawn point off the view axis: bin k is from
+    /// 10·k up to 10·(k + 1) degrees. All rays of an orthographic view are in bin 0.
+    pub off_axis: [Summary; ANGLES],
+    /// Where the vertical error is largest; `None` if nothing is in view or nothing is wrong.
+    pub vertical_at: Option<Place>,
+    /// Where the screen error is largest.
+    pub screen_at: Option<Place>,
+}
+
+/// Measures the triangles of a list. Time is linear in triangles and samples; memory is bounded by a
+/// few thousandths of the field's samples for each of 64 pieces of work.
+pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
+    let ruler = Ruler::new(field, view);
+    let mut total = ruler.tallies();
+    each_part(list, |part| ruler.part(resident, list, part), |part| total.merge(part));
+    total.errors(view.tolerance.px)
+}
+
+/// What is summed up.
+struct Tallies {
+    vertical: Tally,
+    screen: Tally,
+    /// Counted samples beyond the tolerance.
+    beyond: u64,
+    silhouette: Tally,
+    off_axis: [Tally; ANGLES],
+}
+
+impl Tallies {
+    fn merge(&mut self, other: Tallies) {
+        self.vertical.merge(other.vertical);
+        self.screen.merge(other.screen);
+        self.beyond += other.beyond;
+        self.silhouette.merge(other.silhouette);
+        self.off_axis.iter_mut().zip(other.off_axis).for_each(|(mine, theirs)| mine.merge(theirs));
+    }
+
+    fn errors(&self, tolerance_px: f64) -> Errors {
+        Errors {
+            vertical_m: self.vertical.summary(),
+            screen_px: self.screen.summary(),
+            bound_kept: 1.0 - self.beyond as f64 / self.screen.count.max(1) as f64,
+            silhouette_px: self.silhouette.summary(),
+            off_axis: self.off_axis.each_ref().map(|bin| bin.summary().in_units_of(tolerance_px)),
+            vertical_at: self.vertical.largest_at,
+            screen_at: self.screen.largest_at,
+        }
+    }
+}
+
+/// What triangles are measured with.
+struct Ruler<'a> {
+    field: &'a Field,
+    view: &'a View,
+    frame: Frame,
+    frustum: Frustum,
+    silhouette: Silhouette<'a>,
+    /// The view with its near plane moved to the eye: see the module's text.
+    pinhole: View,
+    /// Squared cosines of the angles where bins meet.
+    bin_ends: [f64; ANGLES - 1],
+}
+
+impl<'a> Ruler<'a> {
+    fn new(field: &'a Field, view: &'a View) -> Self {
+        Self {
+            field,
+            view,
+            frame: Frame::placing(field, view),
+            frustum: view.frustum(),
+            silhouette: Silhouette::new(field, view),
+            pinhole: pinhole(view),
+            bin_ends: std::array::from_fn(|k| (10.0 * (k + 1) as f64).to_radians().cos().powi(2)),
+        }
+    }
+
+    fn tallies(&self) -> Tallies {
+        let [w, h] = self.field.size().map(u64::from);
+        let tally = || Tally::new(w * h, 1000);
+        Tallies {
+            vertical: tally(),
+            screen: tally(),
+            beyond: 0,
+            silhouette: tally(),
+            off_axis: std::array::from_fn(|_| tally()),
+        }
+    }
+
+    fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Tallies {
+        let mut tallies = self.tallies();
+        expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle: &Drawn| {
+            self.triangle(&facing_up(&triangle.corners), &mut tallies);
+        });
+        tallies
+    }
+
+    fn triangle(&self, triangle: &Triangle, tallies: &mut Tallies) {
+        if self.frustum.contains(&bounds(self.field, triangle)) == Containment::Outside {
+            return;
+        }
+        let last = self.field.size().map(|n| n as i32 - 1);
+        surface::visit_samples(triangle, |x, z, y| {
+            let error = y - f64::from(self.field.height(x, z));
+            let counts = owns(triangle, [x as i32, z as i32], last);
+            if (error == 0.0 && !counts) || self.field.is_hole(x, z) {
+                return;
+            }
+            let drawn = self.field.world_at(f64::from(x), f64::from(z), y);
+            if in_view(self.view, drawn) {
+                self.sample(Place { sample: [x, z], truth: self.field.world(x, z), drawn }, counts, tallies);
+            }
+        });
+    }
+
+    fn sample(&self, place: Place, counts: bool, tallies: &mut Tallies) {
+        let error_px = self.pinhole.displacement_px(place.drawn, place.truth);
+        tallies.vertical.add((place.drawn.y - place.truth.y).abs(), counts, place);
+        tallies.screen.add(error_px, counts, place);
+        tallies.off_axis[self.angle_bin(place.drawn)].add(error_px, counts, place);
+        tallies.beyond += u64::from(counts && error_px > self.view.tolerance.px);
+        if self.silhouette.passes(place.sample) {
+            tallies.silhouette.add(error_px, counts, place);
+        }
+    }
+
+    /// The bin of a point in view.
+    fn angle_bin(&self, point: DVec3) -> usize {
+        if matches!(self.view.lens, Lens::Orthographic { .. }) {
+            return 0;
+        }
+        let away = point - self.view.eye;
+        let along = away.dot(self.view.forward());
+        let squared_cosine = along * along / away.length_squared();
+        self.bin_ends.iter().filter(|&&end| squared_cosine <= end).count()
+    }
+}
+
+/// The view with its near plane moved to the eye.
+pub(super) fn pinhole(view: &View) -> View {
+    let near = match view.lens {
+        // Not zero: a depth that it divides by must leave finite pixels.
+        Lens::Perspective { .. } => 1e-100,
+        Lens::Orthographic { .. } => f64::NEG_INFINITY,
+    };
+    View { near, ..*view }
+}
+
+/// The box around a triangle, world metres.
+pub(super) fn bounds(field: &Field, triangle: &Triangle) -> Aabb {
+    let [a, b, c] = triangle.map(|corner| field.world_at(corner.x.into(), corner.z.into(), corner.y.into()));
+    Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
+}
+
+/// Whether the triangle is the one that counts a sample inside it or on its border: the one that holds the
+/// sample moved by (ε, ε²) for an infinitely small ε, towards the inside of the field.
+pub(super) fn owns(triangle: &Triangle, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
+    let towards = [if x < last[0] { 1 } else { -1 }, if z < last[1] { 1 } else { -1 }];
+    let [a, b, c] = *triangle;
+    let sample = Corner { x, z, y: 0.0 };
+    [[sample, b, c], [sample, c, a], [sample, a, b]].iter().all(|side| {
+        let [_, p, q] = *side;
+        // Growth of the side's doubled area with x and with z.
+        let (along_x, along_z) = ((q.z - p.z) * towards[0], (p.x - q.x) * towards[1]);
+        (doubled_area(side), along_x, along_z) > (0, 0, 0)
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,259 @@
+//! The error that other terrain renderers were measured with, from what a frame left in the depth buffer.
+//!
+//! For each covered pixel the point P that its centre shows is worked out from the depth; the error is
+//! |P.y − h(P.x, P.z)| · f / |eye − P| pixels, where h is the field interpolated bilinearly and f the focal length
+//! in pixels (869.117 at 1280 × 720 and 45° from bottom to top). It is no exact screen error as
+//! [`geometric`](super::geometric) has it: a vertical distance is taken as if it were seen at a right angle, the
+//! far side of a ridge is no part of it, and drawing every sample as triangles does not score 0, since a cell's
+//! triangles are not its bilinear patch. Frames are pooled: every pixel of every frame weighs the same.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::height::Field;
+use crate::view::{Lens, View};
+
+/// Errors of all pixels of all frames so far. Four bytes a pixel.
+#[derive(Clone, Debug, Default)]
+pub struct Pool {
+    errors_px: Vec<f32>,
+    beside: u64,
+}
+
+/// What a pool holds. Percentiles are exact: the smallest error that so many of the pixels do not exceed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pooled {
+    /// Covered pixels.
+    pub pixels: u64,
+    /// Covered pixels that show no point above or below land with data, by rounding at its border or at a hole:
+    /// they are in no other figure.
+    pub beside: u64,
+    /// Mean, pixels.
+    pub mean: f64,
+    /// Root of the mean square, pixels.
+    pub rms: f64,
+    /// 95th percentile, pixels.
+    pub p95: f64,
+    /// 99th percentile, pixels.
+    pub p99: f64,
+    /// Largest, pixels.
+    pub max: f64,
+}
+
+impl Pool {
+    /// Adds a frame: reversed depth (1 at the near plane, 0 where nothing is drawn) row by row from the top.
+    ///
+    /// # Panics
+    /// If there is not one depth for each of the view's pixels.
+    pub fn add(&mut self, field: &Field, view: &View, depth: &[f32]) {
+        let [width, height] = view.size.map(|n| n as usize);
+        assert_eq!(depth.len(), width * height, "a depth for each pixel");
+        let error =
+            |(k, &depth): (usize, &f32)| (depth > 0.0).then(|| error_px(field, view, [k % width, k / width], depth));
+        let covered: Vec<Option<f32>> = depth.par_iter().enumerate().filter_map(error).collect();
+        self.beside += covered.iter().filter(|error| error.is_none()).count() as u64;
+        self.errors_px.extend(covered.into_iter().flatten());
+    }
+
+    /// The figures.
+    pub fn summary(&self) -> Pooled {
+        let mut sorted = self.errors_px.clone();
+        sorted.par_sort_unstable_by(f32::total_cmp);
+        let n = sorted.len();
+        if n == 0 {
+            return Pooled { pixels: self.beside, beside: self.beside, ..Pooled::default() };
+        }
+        // Summed from the smallest on: the same on every machine, with the least rounding.
+        let sum = |power: i32| sorted.iter().map(|&e| f64::from(e).powi(power)).sum::<f64>() / n as f64;
+        let percentile = |percent: usize| f64::from(sorted[(n * percent).div_ceil(100) - 1]);
+        Pooled {
+            pixels: n as u64 + self.beside,
+            beside: self.beside,
+            mean: sum(1),
+            rms: sum(2).sqrt(),
+            p95: percentile(95),
+            p99: percentile(99),
+            max: f64::from(sorted[n - 1]),
+        }
+    }
+}
+
+fn error_px(field: &Field, view: &View, pixel: [usize; 2], depth: f32) -> Option<f32> {
+    let point = shown(view, pixel, depth);
+    let scale = match view.lens {
+        Lens::Perspective { .. } => view.focal_px() / point.distance(view.eye),
+        // Parallel rays: as far away as may be.
+        Lens::Orthographic { .. } => view.focal_px(),
+    };
+    field.height_at(point.x, point.z).map(|height| ((point.y - height).abs() * scale) as f32)
+}
+
+/// The world point that the centre of a pixel (column, row) shows at a reversed depth above 0: the inverse of
+/// [`View::clip_from_relative`].
+pub fn shown(view: &View, pixel: [usize; 2], depth: f32) -> DVec3 {
+    let aside = |k: usize| (pixel[k] as f64 + 0.5 - f64::from(view.size[k]) / 2.0) / view.focal_px();
+    let (right, down) = (aside(0), aside(1));
+    let in_eye = match view.lens {
+        Lens::Perspective { .. } => DVec3::new(right, -down, -1.0) * (view.near / f64::from(depth)),
+        Lens::Orthographic { far, .. } => DVec3::new(right, -down, (far - view.near) * f64::from(depth) - far),
+    };
+    view.eye + view.world_from_eye * in_eye
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples, rtin};
+    use crate::view::{Metric, Tolerance};
+
+    const SIDE: u32 = 33;
+
+    fn field(height: impl Fn(u32, u32) -> f32) -> Field {
+        let heights = (0..SIDE * SIDE).map(|k| height(k % SIDE, k / SIDE)).collect();
+        Field::new(Samples::F32(heights), [SIDE; 2], [3.0, 2.0], Holes::none((SIDE * SIDE) as usize))
+    }
+
+    fn rough(i: u32, j: u32) -> f32 {
+        ((i * 7 + j * j * 3) % 11) as f32 + (i as f32 / 6.0).sin() * 9.0
+    }
+
+    fn view(lens: Lens) -> View {
+        View {
+            eye: DVec3::new(20.0, 45.0, 90.0),
+            world_from_eye: View::turned(-70.0, -30.0, 10.0),
+            lens,
+            size: [96, 54],
+            near: 0.1,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        }
+    }
+
+    fn lenses() -> [Lens; 2] {
+        [Lens::Perspective { fov_x: 1.2 }, Lens::Orthographic { width: 70.0, far: 400.0 }]
+    }
+
+    /// The samples' own triangles, `lift` metres higher than they are.
+    fn surface(field: &Field, lift: f64) -> Vec<[DVec3; 3]> {
+        let last = SIDE as i32 - 1;
+        let cells = (0..last).flat_map(|j| (0..last).map(move |i| (i, j)));
+        let world = |[x, z]: [i32; 2]| field.world(x as u32, z as u32) + DVec3::Y * lift;
+        cells.flat_map(|(i, j)| rtin::cell(i, j)).map(|t| t.map(world)).collect()
+    }
+
+    /// Where a ray meets a triangle (Möller and Trumbore 1997), in lengths of its direction.
+    fn meets(from: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+        let (ab, ac) = (b - a, c - a);
+        let across = direction.cross(ac);
+        let determinant = ab.dot(across);
+        let away = from - a;
+        let u = away.dot(across) / determinant;
+        let turned = away.cross(ab);
+        let (v, t) = (direction.dot(turned) / determinant, ac.dot(turned) / determinant);
+        (u >= -1e-9 && v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 0.0).then_some(t)
+    }
+
+    /// What a pixel's ray meets first, and its depth, by the clip matrix.
+    fn cast(view: &View, triangles: &[[DVec3; 3]], pixel: [usize; 2]) -> Option<(DVec3, f32)> {
+        let clip = |k: usize| 2.0 * (pixel[k] as f64 + 0.5) / f64::from(view.size[k]) - 1.0;
+        let world_from_clip = view.clip_from_relative().inverse();
+        let [near, beyond] =
+            [1.0, 0.5].map(|depth| world_from_clip.project_point3(DVec3::new(clip(0), clip(1), depth)));
+        let direction = beyond - near;
+        let nearest = triangles.iter().filter_map(|t| meets(view.eye + near, direction, *t)).min_by(f64::total_cmp)?;
+        let hit = near + direction * nearest;
+        let shown = view.clip_from_relative().project_point3(hit);
+        Some((view.eye + hit, shown.z as f32))
+    }
+
+    fn pixels(view: &View) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let [w, h] = view.size.map(|n| n as usize);
+        (0..h).flat_map(move |y| (0..w).map(move |x| [x, y]))
+    }
+
+    #[test]
+    fn points_come_back_from_their_depth() {
+        let field = field(rough);
+        let triangles = surface(&field, 0.0);
+        for lens in lenses() {
+            let view = view(lens);
+            let hits: Vec<_> = pixels(&view).filter_map(|p| Some((p, cast(&view, &triangles, p)?))).collect();
+            assert!(hits.len() > 1000, "{}", hits.len());
+            for (pixel, (hit, depth)) in hits {
+                assert!(shown(&view, pixel, depth).distance(hit) < 1e-3, "{pixel:?} {lens:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn errors_are_those_of_the_rays() {
+        let field = field(rough);
+        for (lens, lift) in lenses().into_iter().flat_map(|lens| [(lens, 0.0), (lens, 1.5)]) {
+            let view = view(lens);
+            let triangles = surface(&field, lift);
+            let (mut depths, mut expected) = (Vec::new(), Vec::new());
+            for pixel in pixels(&view) {
+                let hit = cast(&view, &triangles, pixel);
+                depths.push(hit.map_or(0.0, |(_, depth)| depth));
+                let Some((hit, _)) = hit else { continue };
+                let Some(height) = field.height_at(hit.x, hit.z) else { continue };
+                let scale = match lens {
+                    Lens::Perspective { .. } => 48.0 / 0.6f64.tan() / hit.distance(view.eye),
+                    Lens::Orthographic { .. } => 96.0 / 70.0,
+                };
+                expected.push((hit.y - height).abs() * scale);
+            }
+            let mut pool = Pool::default();
+            pool.add(&field, &view, &depths);
+            let found = pool.summary();
+            expected.sort_by(f64::total_cmp);
+            let n = expected.len();
+            assert!(found.pixels - found.beside >= n as u64 - 2 && found.beside < 20, "{found:?}");
+            let mean = expected.iter().sum::<f64>() / n as f64;
+            let rms = (expected.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
+            let [p95, p99] = [95, 99].map(|percent| expected[n * percent / 100]);
+            let pairs = [
+                (found.mean, mean),
+                (found.rms, rms),
+                (found.p95, p95),
+                (found.p99, p99),
+                (found.max, expected[n - 1]),
+            ];
+            for (a, b) in pairs {
+                assert!((a - b).abs() < 2e-3 * b, "{lens:?} lifted {lift}: {a} and {b} of {found:?}");
+            }
+            assert!(mean > 0.1, "an error worth comparing: {mean}");
+        }
+    }
+
+    #[test]
+    fn a_plane_has_no_error_and_frames_pool() {
+        let field = field(|i, j| 2.0 * i as f32 - j as f32);
+        let view = view(lenses()[0]);
+        let depths = |lift: f64| -> Vec<f32> {
+            let triangles = surface(&field, lift);
+            pixels(&view).map(|p| cast(&view, &triangles, p).map_or(0.0, |(_, depth)| depth)).collect()
+        };
+        let mut pool = Pool::default();
+        assert_eq!(pool.summary(), Pooled::default());
+        pool.add(&field, &view, &depths(0.0));
+        let one = pool.summary();
+        assert!(one.pixels > 1000 && one.max < 1e-3, "{one:?}");
+        let lifted = depths(2.0);
+        let mut alone = Pool::default();
+        alone.add(&field, &view, &lifted);
+        pool.add(&field, &view, &lifted);
+        let (alone, both) = (alone.summary(), pool.summary());
+        assert!(alone.mean > 0.5 && both.pixels == one.pixels + alone.pixels, "{both:?}");
+        let share = (alone.pixels - alone.beside) as f64 / (both.pixels - both.beside) as f64;
+        assert!((both.mean - alone.mean * share).abs() < 1e-3 && both.max == alone.max, "{both:?}, {alone:?}");
+    }
+
+    #[test]
+    fn the_published_constant() {
+        let mut view = view(lenses()[0]);
+        view.size = [1280, 720];
+        view.lens = Lens::Perspective { fov_x: 2.0 * ((22.5f64).to_radians().tan() * 1280.0 / 720.0).atan() };
+        assert!((view.focal_px() - 869.117).abs() < 1e-3, "{}", view.focal_px());
+    }
+}

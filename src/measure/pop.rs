@@ -1,0 +1,223 @@
+//! The pop meter: how far the surface jumps on the screen from one frame to the next by the change of its level
+//! of detail alone.
+//!
+//! The list of frame t − 1 and that of frame t are both laid over the lattice in the view of frame t: an expanded
+//! list knows nothing of the eye but through its own instances, in which morph weights stand as they were. Every
+//! sample with data that both cover, and whose point on the newer surface is in view, is measured once: the way
+//! between its two points on the screen, both projected in f64 as in [`geometric`](super::geometric).
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::geometric::{owns, pinhole};
+use super::histogram::Histogram;
+use super::summary::{Place, Tally, infinite_if_null};
+use super::{each_part, facing_up, in_view};
+use crate::draw::layout::Frame;
+use crate::draw::{Draw, DrawList, Geometry, expand};
+use crate::height::Field;
+use crate::height::surface;
+use crate::view::View;
+
+/// Powers of two, px, between which the histogram has its bins: from 1/64 px, far below what anybody sees, to 64.
+const BINS: [i32; 2] = [-6, 6];
+
+/// What a frame was drawn from. A technique with uploads changes its resident geometry from frame to frame:
+/// then a copy from before goes with the list from before.
+#[derive(Clone, Copy, Debug)]
+pub struct State<'a> {
+    /// The technique's resident geometry at that frame.
+    pub resident: &'a Geometry,
+    /// The draw list of that frame.
+    pub list: &'a DrawList,
+}
+
+/// What [`pop`] finds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pop {
+    /// Samples measured.
+    pub samples: u64,
+    /// Exact: the smallest displacement, pixels, that 99 % of the samples do not exceed.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub p99_px: f64,
+    /// Largest displacement, pixels.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub max_px: f64,
+    /// The sample with the largest; `None` if nothing moved.
+    pub at: Option<[u32; 2]>,
+    /// Samples by displacement, pixels: bins from 2^−6 to 2^6.
+    pub histogram: Histogram,
+}
+
+/// Measures the jump from the level of detail of frame t − 1 to that of frame t in the view of frame t. Takes
+/// eight bytes a sample of the field while it runs.
+pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
+    let meter = Meter { field, view, pinhole: pinhole(view), frame: Frame::placing(field, view) };
+    let heights = meter.heights(before);
+    let (mut tally, mut histogram) = meter.empty();
+    let work = |part: &Draw| meter.part(&heights, after, part);
+    each_part(after.list, work, |(part_tally, part_histogram)| {
+        tally.merge(part_tally);
+        histogram.merge(&part_histogram);
+    });
+    Pop {
+        samples: tally.count,
+        p99_px: tally.quantile(),
+        max_px: tally.largest,
+        at: tally.largest_at.map(|place| place.sample),
+        histogram,
+    }
+}
+
+struct Meter<'a> {
+    field: &'a Field,
+    view: &'a View,
+    pinhole: View,
+    frame: Frame,
+}
+
+impl Meter<'_> {
+    fn empty(&self) -> (Tally, Histogram) {
+        let [w, h] = self.field.size().map(u64::from);
+        (Tally::new(w * h, 100), Histogram::new(BINS[0], BINS[1]))
+    }
+
+    fn index(&self, x: u32, z: u32) -> usize {
+        z as usize * self.field.size()[0] as usize + x as usize
+    }
+
+    /// Calls `visit` for every sample of a part that the part's triangles count, with the drawn height.
+    fn samples(&self, state: State, part: &Draw, mut visit: impl FnMut(u32, u32, f64)) {
+        let last = self.field.size().map(|n| n as i32 - 1);
+        expand::visit_draw(self.field, &self.frame, state.resident, state.list, part, &mut |drawn| {
+            let triangle = facing_up(&drawn.corners);
+            surface::visit_samples(&triangle, |x, z, y| {
+                if owns(&triangle, [x as i32, z as i32], last) && !self.field.is_hole(x, z) {
+                    visit(x, z, y);
+                }
+            });
+        });
+    }
+
+    /// The drawn height at every sample, as bits; not a number where nothing is drawn. One triangle counts a
+    /// sample, so no two threads write one place, and the order does not matter.
+    fn heights(&self, state: State) -> Vec<AtomicU64> {
+        let [w, h] = self.field.size().map(|n| n as usize);
+        let heights: Vec<_> = (0..w * h).map(|_| AtomicU64::new(f64::NAN.to_bits())).collect();
+        let store = |x, z, y: f64| heights[self.index(x, z)].store(y.to_bits(), Ordering::Relaxed);
+        each_part(state.list, |part| self.samples(state, part, store), |()| ());
+        heights
+    }
+
+    fn part(&self, before: &[AtomicU64], after: State, part: &Draw) -> (Tally, Histogram) {
+        let (mut tally, mut histogram) = self.empty();
+        self.samples(after, part, |x, z, y| {
+            let old = f64::from_bits(before[self.index(x, z)].load(Ordering::Relaxed));
+            let [from, to] = [old, y].map(|y| self.field.world_at(x.into(), z.into(), y));
+            if !old.is_nan() && in_view(self.view, to) {
+                let moved_px = self.pinhole.displacement_px(to, from);
+                tally.add(moved_px, true, Place { sample: [x, z], truth: from, drawn: to });
+                histogram.add(moved_px);
+            }
+        });
+        (tally, histogram)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::{ExplicitVertex, Instance, Source, Topology};
+    use crate::height::{Holes, Samples};
+    use crate::view::{Lens, Metric, Tolerance};
+    use glam::DVec3;
+
+    const SIDE: i32 = 40;
+
+    fn field() -> Field {
+        let count = ((SIDE + 1) * (SIDE + 1)) as usize;
+        let mut holes = Holes::none(count);
+        holes.insert(100);
+        Field::new(Samples::F32(vec![0.0; count]), [SIDE as u32 + 1; 2], [2.0, 2.0], holes)
+    }
+
+    /// A level slab from column 0 to `east`.
+    fn slab(east: i32, height: f32) -> DrawList {
+        let vertex = |position| ExplicitVertex { position, height, ..ExplicitVertex::default() };
+        let mut list = DrawList { instances: vec![Instance::default()], ..DrawList::default() };
+        list.streamed.vertices = [[0, 0], [0, SIDE], [east, 0], [east, SIDE]].map(vertex).to_vec();
+        list.streamed.indices = vec![0, 1, 2, 2, 1, 3];
+        list.draws.push(Draw {
+            source: Source::Streamed,
+            topology: Topology::Triangles,
+            indices: 0..6,
+            instances: 0..1,
+        });
+        list
+    }
+
+    /// All of the field from a slanted orthographic eye: 0.5 px a metre.
+    fn view() -> View {
+        View {
+            eye: DVec3::new(40.0, 500.0, 500.0),
+            world_from_eye: View::turned(-90.0, -45.0, 0.0),
+            lens: Lens::Orthographic { width: 1280.0, far: 1e4 },
+            size: [640, 640],
+            near: 1.0,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        }
+    }
+
+    fn jump(before: &DrawList, after: &DrawList) -> Pop {
+        let resident = Geometry::default();
+        let state = |list| State { resident: &resident, list };
+        pop(&field(), &view(), state(before), state(after))
+    }
+
+    #[test]
+    fn a_slab_that_rises_moves_every_sample_alike() {
+        let found = jump(&slab(SIDE, 3.0), &slab(SIDE, 11.0));
+        // 8 m at 0.5 px a metre, seen from 45° above.
+        let expected = 4.0 * 0.5f64.sqrt();
+        assert_eq!(found.samples, 41 * 41 - 1, "all but the hole");
+        assert!((found.max_px - expected).abs() < 1e-9 && (found.p99_px - expected).abs() < 1e-9, "{found:?}");
+        // 2.83 px lie in the bin from 2 to 4.
+        assert_eq!(found.histogram.counts.iter().position(|&n| n == found.samples), Some(8));
+        assert_eq!(found.histogram.begin(8), 2.0);
+    }
+
+    #[test]
+    fn nothing_moves_between_equal_states_whatever_the_way_they_are_split() {
+        let mut split = slab(SIDE, 3.0);
+        let middle = ExplicitVertex { position: [10, 10], height: 3.0, ..ExplicitVertex::default() };
+        split.streamed.vertices.push(middle);
+        split.streamed.indices = vec![0, 1, 4, 1, 2, 4, 2, 0, 4, 2, 1, 3];
+        split.draws[0].indices = 0..12;
+        for after in [slab(SIDE, 3.0), split] {
+            let found = jump(&slab(SIDE, 3.0), &after);
+            assert_eq!((found.samples, found.histogram.counts[0]), (1680, 1680));
+            assert!(found.max_px < 1e-9, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn only_land_drawn_in_both_counts() {
+        // Columns 0 to 9 and 0 to 19: the east side of the smaller one belongs to nobody.
+        let found = jump(&slab(10, 3.0), &slab(20, 4.0));
+        assert_eq!(found.samples, 10 * 41, "columns 0 to 9");
+    }
+
+    #[test]
+    fn a_jump_of_a_few_samples_is_in_the_largest_but_not_in_p99() {
+        let mut after = slab(SIDE, 3.0);
+        let corner = |position, height| ExplicitVertex { position, height, ..ExplicitVertex::default() };
+        // A spike of 100 m on a triangle of one cell at the corner.
+        after.streamed.vertices.extend([corner([0, 0], 103.0), corner([0, 1], 3.0), corner([1, 0], 3.0)]);
+        after.streamed.indices = vec![4, 5, 6, 5, 1, 2, 6, 5, 2, 2, 1, 3];
+        after.draws[0].indices = 0..12;
+        let found = jump(&slab(SIDE, 3.0), &after);
+        assert!((found.max_px - 50.0 * 0.5f64.sqrt()).abs() < 1e-9 && found.p99_px < 1e-9, "{found:?}");
+        assert_eq!(found.at, Some([0, 0]));
+    }
+}

@@ -1,0 +1,168 @@
+//! The coarsest conforming mesh of right triangles within an error.
+//!
+//! The hierarchy: a square of 2^n cells around the field is two right triangles; a triangle is split at the
+//! midpoint of its base, together with the one on the other side of the base. So a mesh is the set of the
+//! midpoints at which it is split, and each midpoint needs the two before it: the apexes of the two triangles.
+//!
+//! Every split that is made is needed by every mesh of the hierarchy within the error: a triangle is split if its
+//! own true error is too large, and whenever it is the other half of one that is. So the mesh is the coarsest.
+//!
+//! Beyond the field's last column and row heights go on as they are there, and neither samples nor triangles
+//! count.
+
+use crate::height::Field;
+use crate::height::surface::{self, Corner, Triangle, doubled_area};
+use crate::measure::facing_up;
+
+/// Triangles of the mesh, and its largest error, metres. The field has no holes.
+pub fn coarsest(field: &Field, tolerance_m: f64) -> (u64, f64) {
+    let cells = field.size().map(|n| n - 1);
+    let side = cells[0].max(cells[1]).next_power_of_two() as i32;
+    let words = (side as usize + 1).pow(2).div_ceil(64);
+    let mut mesh = Rtin { field, side, last: cells.map(|n| n as i32), tolerance_m, split: vec![0; words] };
+    mesh.refine();
+    mesh.measure()
+}
+
+struct Rtin<'a> {
+    field: &'a Field,
+    /// Cells along a side of the square.
+    side: i32,
+    last: [i32; 2],
+    tolerance_m: f64,
+    /// A bit for each position of the square at which triangles are split.
+    split: Vec<u64>,
+}
+
+impl Rtin<'_> {
+    /// Splits until every triangle is within the error.
+    fn refine(&mut self) {
+        let mut waiting = Vec::new();
+        for triangle in roots(self.side) {
+            self.demand(triangle, &mut waiting);
+        }
+        while let Some(at) = waiting.pop() {
+            if !self.mark(at) {
+                continue;
+            }
+            let (before, after) = around(at, self.side);
+            waiting.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
+            for k in 0..4 {
+                self.demand([at, after[k], after[(k + 1) % 4]], &mut waiting);
+            }
+        }
+    }
+
+    /// Asks for the split of a triangle [apex, base, base] if it is beyond the error.
+    fn demand(&self, triangle: [[i32; 2]; 3], waiting: &mut Vec<[i32; 2]>) {
+        if triangle.iter().all(|&p| self.is_inside(p))
+            && let Some(at) = midpoint(triangle)
+            && self.error(triangle) > self.tolerance_m
+        {
+            waiting.push(at);
+        }
+    }
+
+    /// Counts what is not split, and measures it.
+    fn measure(&self) -> (u64, f64) {
+        let (mut count, mut largest) = (0, 0.0f64);
+        let mut open = roots(self.side).to_vec();
+        while let Some(triangle) = open.pop() {
+            let [apex, a, b] = triangle;
+            match midpoint(triangle).filter(|&at| self.is_split(at)) {
+                Some(at) => open.extend([[at, apex, a], [at, b, apex]]),
+                None if self.meets_field(triangle) => {
+                    count += 1;
+                    largest = largest.max(self.error(triangle));
+                }
+                None => {}
+            }
+        }
+        (count, largest)
+    }
+
+    /// The largest distance of a triangle from the field's samples in it, metres.
+    fn error(&self, triangle: [[i32; 2]; 3]) -> f64 {
+        let triangle = facing_up(&triangle.map(|at| self.corner(at)));
+        if triangle.iter().all(|corner| corner.x <= self.last[0] && corner.z <= self.last[1]) {
+            return f64::from(surface::deviation(self.field, &triangle));
+        }
+        let mut largest = 0.0f64;
+        surface::visit_samples(&triangle, |x, z, y| {
+            if x as i32 <= self.last[0] && z as i32 <= self.last[1] {
+                largest = largest.max((y - f64::from(self.field.height(x, z))).abs());
+            }
+        });
+        largest
+    }
+
+    fn corner(&self, [x, z]: [i32; 2]) -> Corner {
+        let y = self.field.height(x.min(self.last[0]) as u32, z.min(self.last[1]) as u32);
+        Corner { x, z, y }
+    }
+
+    /// Whether some of a triangle's area lies on the field: no side of either parts them.
+    fn meets_field(&self, triangle: [[i32; 2]; 3]) -> bool {
+        let at = |[x, z]: [i32; 2]| Corner { x, z, y: 0.0 };
+        let [a, b, c]: Triangle = facing_up(&triangle.map(at));
+        let [w, h] = self.last;
+        let field = [[0, 0], [w, 0], [0, h], [w, h]].map(at);
+        let within = |[p, q]: [Corner; 2]| field.iter().any(|&corner| doubled_area(&[corner, p, q]) > 0);
+        a.x.min(b.x).min(c.x) < w && a.z.min(b.z).min(c.z) < h && [[a, b], [b, c], [c, a]].into_iter().all(within)
+    }
+
+    fn is_inside(&self, at: [i32; 2]) -> bool {
+        at.iter().all(|n| (0..=self.side).contains(n))
+    }
+
+    fn is_corner(&self, at: [i32; 2]) -> bool {
+        at.iter().all(|&n| n == 0 || n == self.side)
+    }
+
+    fn bit(&self, [x, z]: [i32; 2]) -> (usize, u64) {
+        let k = z as usize * (self.side as usize + 1) + x as usize;
+        (k / 64, 1 << (k % 64))
+    }
+
+    fn is_split(&self, at: [i32; 2]) -> bool {
+        let (word, bit) = self.bit(at);
+        self.split[word] & bit != 0
+    }
+
+    /// Whether the position was not marked before.
+    fn mark(&mut self, at: [i32; 2]) -> bool {
+        let (word, bit) = self.bit(at);
+        let new = self.split[word] & bit == 0;
+        self.split[word] |= bit;
+        new
+    }
+}
+
+/// The two triangles of the square, [apex, base, base].
+fn roots(side: i32) -> [[[i32; 2]; 3]; 2] {
+    [[[0, side], [side, side], [0, 0]], [[side, 0], [0, 0], [side, side]]]
+}
+
+/// The midpoint of a triangle's base; `None` if that is a side or a diagonal of a cell.
+fn midpoint([_, a, b]: [[i32; 2]; 3]) -> Option<[i32; 2]> {
+    let sum = [a[0] + b[0], a[1] + b[1]];
+    (sum[0] % 2 == 0 && sum[1] % 2 == 0).then_some(sum.map(|n| n / 2))
+}
+
+/// Around a midpoint: the apexes of the two triangles split there, and the corners of the square that they make
+/// up, in order. Some may lie outside.
+fn around([x, z]: [i32; 2], side: i32) -> ([[i32; 2]; 2], [[i32; 2]; 4]) {
+    let step = 1 << (x | z | side).trailing_zeros();
+    let straight = [[x + step, z], [x, z + step], [x - step, z], [x, z - step]];
+    let aslant = [[x - step, z - step], [x + step, z - step], [x + step, z + step], [x - step, z + step]];
+    match [x / step % 2, z / step % 2] {
+        // The middle of a cell; its diagonals alternate as in `height::rtin`.
+        [1, 1] => {
+            let parity = (x + z - 2 * step) / (2 * step) % 2;
+            (if parity == 0 { [aslant[1], aslant[3]] } else { [aslant[0], aslant[2]] }, aslant)
+        }
+        // On a side along x.
+        [1, _] => ([straight[1], straight[3]], straight),
+        _ => ([straight[0], straight[2]], straight),
+    }
+}

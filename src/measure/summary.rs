@@ -1,0 +1,148 @@
+//! A quantity over many samples: count, root mean square, an exact high quantile, the largest and where it is.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// A quantity over all samples in view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Samples.
+    pub count: u64,
+    /// Root of the mean square.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub rms: f64,
+    /// Exact: the smallest value that 99.9 % of the samples do not exceed.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub p999: f64,
+    /// Largest.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub max: f64,
+}
+
+impl Summary {
+    /// The same in a unit of the given size.
+    pub fn in_units_of(&self, unit: f64) -> Summary {
+        Summary { count: self.count, rms: self.rms / unit, p999: self.p999 / unit, max: self.max / unit }
+    }
+}
+
+/// JSON has no infinity, writers put `null` in its place.
+pub(super) fn infinite_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+}
+
+/// A sample and the point drawn for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Lattice position.
+    pub sample: [u32; 2],
+    /// The sample's world position.
+    pub truth: DVec3,
+    /// The drawn point's world position.
+    pub drawn: DVec3,
+}
+
+/// Sums one quantity up.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    pub count: u64,
+    squares: f64,
+    /// The largest counted values that are not 0, at most `capacity`, as bits: the order of non-negative
+    /// numbers is that of their bits. Enough for the quantile above which `1 / denominator` of them lie.
+    top: BinaryHeap<Reverse<u64>>,
+    capacity: usize,
+    denominator: u64,
+    pub largest: f64,
+    pub largest_at: Option<Place>,
+}
+
+impl Tally {
+    /// For at most `samples` values, and the quantile above which one of `denominator` lies.
+    pub fn new(samples: u64, denominator: u64) -> Self {
+        Self { capacity: (samples / denominator) as usize + 1, denominator, ..Self::default() }
+    }
+
+    /// A value that is no negative number. One that does not count may be the largest all the same.
+    pub fn add(&mut self, value: f64, counts: bool, place: Place) {
+        if value > self.largest {
+            (self.largest, self.largest_at) = (value, Some(place));
+        }
+        if counts {
+            self.count += 1;
+            self.squares += value * value;
+            self.keep(Reverse(value.to_bits()));
+        }
+    }
+
+    fn keep(&mut self, value: Reverse<u64>) {
+        if value.0 != 0 && self.top.len() < self.capacity {
+            self.top.push(value);
+        } else if let Some(mut smallest) = self.top.peek_mut()
+            && smallest.0 < value.0
+        {
+            *smallest = value;
+        }
+    }
+
+    pub fn merge(&mut self, other: Tally) {
+        if other.largest > self.largest {
+            (self.largest, self.largest_at) = (other.largest, other.largest_at);
+        }
+        self.count += other.count;
+        self.squares += other.squares;
+        other.top.into_iter().for_each(|value| self.keep(value));
+    }
+
+    /// Root of the mean square.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.count.max(1) as f64).sqrt()
+    }
+
+    /// The smallest value that all but one of `denominator` counted ones do not exceed.
+    pub fn quantile(&self) -> f64 {
+        let mut top: Vec<u64> = self.top.iter().map(|value| value.0).collect();
+        top.sort_unstable_by_key(|&bits| Reverse(bits));
+        top.get((self.count / self.denominator) as usize).map_or(0.0, |&bits| f64::from_bits(bits))
+    }
+
+    /// With the quantile as 99.9th percentile.
+    pub fn summary(&self) -> Summary {
+        debug_assert_eq!(self.denominator, 1000);
+        Summary { count: self.count, rms: self.rms(), p999: self.quantile(), max: self.largest }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOWHERE: Place = Place { sample: [0, 0], truth: DVec3::ZERO, drawn: DVec3::ZERO };
+
+    #[test]
+    fn quantiles_of_parts_are_those_of_the_whole() {
+        let value = |k: u64| (k.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
+        for (count, denominator) in [(1, 100), (99, 100), (100, 100), (12_345, 100), (54_321, 1000)] {
+            let mut whole = Tally::new(count, denominator);
+            for part in 0..7 {
+                let mut tally = Tally::new(count, denominator);
+                (0..count).filter(|k| k % 7 == part).for_each(|k| tally.add(value(k), true, NOWHERE));
+                whole.merge(tally);
+            }
+            let mut sorted: Vec<f64> = (0..count).map(value).collect();
+            sorted.sort_by(f64::total_cmp);
+            let rank = count - count / denominator;
+            assert_eq!(whole.quantile(), sorted[rank as usize - 1], "{count} values");
+            assert_eq!(whole.largest, sorted[count as usize - 1]);
+        }
+    }
+
+    #[test]
+    fn an_infinite_summary_survives_json() {
+        let summary = Summary { count: 3, rms: f64::INFINITY, p999: 2.5, max: f64::INFINITY };
+        let text = serde_json::to_string(&summary).unwrap();
+        assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), summary);
+    }
+}
