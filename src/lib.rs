@@ -10,6 +10,8 @@
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
+//! - [`bench`]: error against run time, along named paths.
+//! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
 
@@ -27,6 +29,10 @@ pub mod plan;
 pub mod gpu;
 
 pub mod measure;
+
+pub mod bench;
+
+pub mod report;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;
