@@ -1,4 +1,4 @@
-//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`).
+//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`); tells the commit.
 
 #[cfg(feature = "vulkan")]
 #[path = "src/draw/layout.rs"]
@@ -7,8 +7,27 @@ mod layout;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
+    tell_commit();
     #[cfg(feature = "vulkan")]
     shaders::compile_all();
+}
+
+/// In a clone, makes the commit known to the program as `CUESTA_COMMIT`.
+fn tell_commit() {
+    let git = |words: &[&str]| {
+        let output = std::process::Command::new("git").args(words).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then(|| text.trim().to_string())
+    };
+    // The log of HEAD grows with every commit and checkout.
+    if let (Some(commit), Some(log)) =
+        (git(&["rev-parse", "--short=12", "HEAD"]), git(&["rev-parse", "--git-path", "logs/HEAD"]))
+    {
+        println!("cargo:rustc-env=CUESTA_COMMIT={commit}");
+        if std::path::Path::new(&log).exists() {
+            println!("cargo:rerun-if-changed={log}");
+        }
+    }
 }
 
 #[cfg(feature = "vulkan")]

@@ -11,6 +11,8 @@
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
+//! - [`bench`]: error against run time, along named paths.
+//! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
 
@@ -31,6 +33,10 @@ pub mod measure;
 
 #[cfg(feature = "vulkan")]
 pub mod scene;
+
+pub mod bench;
+
+pub mod report;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -7,7 +7,7 @@ use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
 
 /// A triangle of a draw list.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drawn {
     /// Its corners.
     pub corners: Triangle,

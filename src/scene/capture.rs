@@ -22,6 +22,11 @@ pub struct AsDrawn {
 }
 
 impl Stage {
+    /// Whether the device can capture.
+    pub fn captures(&self) -> bool {
+        self.gpu.captures
+    }
+
     /// Every triangle of the last list that is not degenerate in plan, captured on the device for this view.
     pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<Vec<AsDrawn>> {
         let mut found = Vec::new();

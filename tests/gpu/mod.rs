@@ -1,6 +1,7 @@
 //! What only a device can show. Every test runs with core and synchronization validation on and fails on any
 //! message. Without a device they say so and pass, unless REQUIRE_GPU=1.
 
+mod bench;
 mod capture;
 mod golden;
 mod layout;

@@ -1,0 +1,176 @@
+//! The laboratory that draws on a device: a technique's stage for each scene, and everything that is measured of its
+//! frames.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, anyhow};
+
+use super::pool::Pool;
+use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
+use super::run::{Frame, Laboratory, Scene, Timed};
+use crate::draw::layout;
+use crate::draw::{DrawList, Geometry, expand};
+use crate::gpu::Gpu;
+use crate::height::Field;
+use crate::lod::{self, Settings, Technique};
+use crate::measure::{economy, geometric, pop, watertight};
+use crate::plan::{self, Look, ScenePlan};
+use crate::scene::holes::{Truth, covered};
+use crate::scene::{self, Copy, Stage};
+use crate::view::View;
+
+/// Lists of more triangles are not captured: comparing them to their expansion would take minutes.
+const CAPTURED: u64 = 4_000_000;
+
+/// Draws on one device with one look.
+pub struct DeviceLaboratory {
+    gpu: Arc<Gpu>,
+    look: Look,
+    /// The scene whose truths are kept, and they, by frame.
+    truths: (String, BTreeMap<usize, Truth>),
+}
+
+impl DeviceLaboratory {
+    /// On this device.
+    pub fn new(gpu: Arc<Gpu>, look: Look) -> Self {
+        Self { gpu, look, truths: Default::default() }
+    }
+
+    fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
+        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        Ok(plan.with_morph(technique.morphs()))
+    }
+
+    /// A technique as it is when just made, and its stage.
+    fn set(&self, scene: &Scene) -> Result<(Box<dyn Technique>, Stage)> {
+        let technique = build(scene.case, scene.field)?;
+        let plan = self.plan(scene.field, technique.as_ref())?;
+        let stage = self.scene(scene.field, &plan).stage(technique.as_ref(), scene.case.size)?;
+        Ok((technique, stage))
+    }
+
+    fn scene<'a>(&'a self, field: &'a Arc<Field>, plan: &'a ScenePlan) -> scene::Scene<'a> {
+        scene::Scene { gpu: &self.gpu, field, plan, look: &self.look, overlay: None }
+    }
+
+    /// The truth of a frame: drawn once for all cases of a scene.
+    fn truth(&mut self, scene: &Scene, frame: usize) -> Result<&Truth> {
+        let name = scene.case.scene();
+        if self.truths.0 != name {
+            self.truths = (name, BTreeMap::new());
+        }
+        if !self.truths.1.contains_key(&frame) {
+            let plan = ScenePlan::new(scene.field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+            let truth = Truth::new(&self.scene(scene.field, &plan), &scene.views[frame])?;
+            self.truths.1.insert(frame, truth);
+        }
+        Ok(&self.truths.1[&frame])
+    }
+}
+
+fn build(case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
+    let (name, variant) =
+        case.technique.split_once(':').map_or((case.technique.as_str(), None), |(name, variant)| (name, Some(variant)));
+    let entry = lod::find(name).with_context(|| format!("no technique {name}"))?;
+    let given: Vec<_> = case.settings.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
+    let settings = Settings::new(entry, variant, &given).map_err(|e| anyhow!("{}: {e}", case.technique))?;
+    Ok((entry.build)(Arc::clone(field), &settings))
+}
+
+impl Laboratory for DeviceLaboratory {
+    fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)> {
+        let candidate = &self.gpu.candidate;
+        let device =
+            Device { name: candidate.name.clone(), driver: candidate.driver.clone(), is_cpu: candidate.is_software() };
+        let plan = |(terrain, field): &(Terrain, Arc<Field>)| {
+            let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+            let (kept, left_out) = plan.decisions(field);
+            let [kept, left_out] = [kept, left_out].map(|all| all.into_iter().map(decision).collect());
+            Ok(Plan { terrain: terrain.name.clone(), kept, left_out })
+        };
+        Ok((device, fields.iter().map(plan).collect::<Result<_>>()?))
+    }
+
+    fn time(&mut self, scene: &Scene) -> Result<Timed> {
+        let (mut technique, mut stage) = self.set(scene)?;
+        let has_clock = self.gpu.timestamp_ns > 0.0;
+        let draw = |view: &View| -> Result<Frame> {
+            let times = stage.draw(technique.as_mut(), view, Copy::Nothing)?;
+            let floor = stage.draw_floor(view, Copy::Nothing)?;
+            let list = &stage.list;
+            Ok(Frame {
+                frame_ms: times.frame_ms,
+                select_ms: times.select_ms,
+                record_ms: times.record_ms,
+                gpu_ms: has_clock.then_some(times.gpu.total_ms),
+                upload_ms: Some(times.upload_ms),
+                floor_ms: Some(floor.frame_ms),
+                triangles: list.triangles(),
+                vertices: times.gpu.statistics.map(|[vertices, ..]| vertices),
+                draws: list.draws.len() as u64,
+                commands: list.commands() as u64,
+            })
+        };
+        let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
+        let device_bytes = self.gpu.device_bytes().into_iter().map(|(purpose, n)| (purpose.to_string(), n)).collect();
+        Ok(Timed { frames, device_bytes })
+    }
+
+    fn measure(&mut self, scene: &Scene) -> Result<Errors> {
+        let (mut technique, mut stage) = self.set(scene)?;
+        let mut pool = Pool::default();
+        let mut before: Option<(Geometry, DrawList)> = None;
+        for (frame, view) in scene.views.iter().enumerate() {
+            let is_measured = frame % scene.case.every == 0;
+            let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
+            let times = stage.draw(technique.as_mut(), view, copy)?;
+            if is_measured {
+                let truth = self.truth(scene, frame)?;
+                let fragments = times.gpu.statistics.map(|[.., fragments]| fragments);
+                look(scene, frame, technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
+                if let Some((resident, list)) = &before {
+                    let old = pop::State { resident, list };
+                    let new = pop::State { resident: technique.resident(), list: &stage.list };
+                    pool.pop(&pop::pop(scene.field, view, old, new));
+                }
+            }
+            // What the next frame is held against, if it is measured.
+            let is_wanted = (frame + 1) % scene.case.every == 0;
+            before = is_wanted.then(|| (technique.resident().clone(), stage.list.clone()));
+        }
+        pool.finish(scene)
+    }
+}
+
+fn decision(of_plan: plan::Decision) -> Decision {
+    Decision { feature: of_plan.feature.to_string(), reason: of_plan.reason, bytes: of_plan.bytes }
+}
+
+/// Measures one frame.
+fn look(
+    scene: &Scene,
+    frame: usize,
+    technique: &dyn Technique,
+    stage: &mut Stage,
+    truth: &Truth,
+    fragments: Option<u64>,
+    pool: &mut Pool,
+) -> Result<()> {
+    let (view, field, resident) = (&scene.views[frame], scene.field, technique.resident());
+    let picture = stage.picture();
+    let placing = layout::Frame::placing(field, view);
+    let triangles = expand::triangles(field, &placing, resident, &stage.list);
+    if stage.list.triangles() <= CAPTURED && stage.captures() {
+        let captured = stage.capture(technique, view)?;
+        pool.captured(captured.len() == triangles.len() && captured.iter().zip(&triangles).all(|(a, b)| a.drawn == *b));
+    }
+    pool.proof(frame, watertight::prove(field, &view.frustum(), &triangles));
+    drop(triangles);
+    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), view.tolerance.px);
+    let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
+    pool.economy(&economy::economy(field, view, resident, &stage.list), fragments, covered);
+    pool.peers(field, view, &stage.depth());
+    pool.hole_pixels(truth.hole_pixels(view, &picture).len());
+    pool.picture(frame, &picture, &truth.picture)
+}

@@ -1,0 +1,106 @@
+//! The public benchmark kit: a fixed list of scenes, so that two people's results can be compared. Only synthetic
+//! fields, which are the same to the bit on every machine; real ones join when their files are given.
+
+use std::sync::Arc;
+
+use super::rows::Terrain;
+use crate::height::Field;
+use crate::height::synth::{self, Kind};
+
+/// Version of the list: it grows with any change of what is drawn.
+pub const VERSION: u32 = 1;
+/// Paths over real fields that join the kit.
+pub const REAL_PATHS: &[&str] = &["circle", "corner"];
+
+/// One scene of the kit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KitScene {
+    /// The family of the field, at 1 m between samples.
+    pub kind: Kind,
+    /// Samples along both sides.
+    pub side: u32,
+    /// Its seed.
+    pub seed: u64,
+    /// The path over it.
+    pub path: &'static str,
+    /// Frames of the path.
+    pub frames: usize,
+    /// Errors are measured at every so many frames.
+    pub every: usize,
+}
+
+const fn peers(side: u32) -> KitScene {
+    KitScene { kind: Kind::Peers, side, seed: 1, path: "fly", frames: 120, every: 10 }
+}
+
+const fn scene(kind: Kind, side: u32, seed: u64, path: &'static str) -> KitScene {
+    KitScene { kind, side, seed, path, frames: 60, every: 5 }
+}
+
+/// Every scene. Those named `peers` are the protocol under which other renderers were measured: 20 frames of warm-up,
+/// 1280 × 720, vertical field of view 45°, errors at every 10th pose.
+pub const SCENES: &[KitScene] = &[
+    peers(513),
+    peers(1025),
+    peers(2049),
+    peers(4097),
+    scene(Kind::Eroded, 1025, 7, "circle"),
+    scene(Kind::Eroded, 1025, 7, "skim"),
+    scene(Kind::Eroded, 1025, 7, "spin"),
+    scene(Kind::Eroded, 1025, 7, "zoom"),
+    scene(Kind::Fractal, 1025, 1, "dive"),
+    scene(Kind::Fractal, 1025, 1, "hover"),
+    scene(Kind::Fractal, 1025, 1, "teleport"),
+    scene(Kind::Cliff, 513, 1, "corner"),
+];
+
+/// Frames of warm-up in every scene of the kit.
+pub const WARM_UP: usize = 20;
+/// Pictures of every scene of the kit, pixels.
+pub const SIZE: [u32; 2] = [1280, 720];
+
+impl KitScene {
+    /// The terrain's row.
+    pub fn terrain(&self) -> Terrain {
+        let name = format!("{}-{}", self.kind, self.seed);
+        Terrain { name, size: [self.side; 2], spacing_m: [1.0; 2] }
+    }
+
+    /// Makes the field.
+    pub fn field(&self) -> Arc<Field> {
+        let mut field = synth::synth(self.kind, [self.side; 2], self.seed);
+        field.spacing = [1.0; 2];
+        Arc::new(field)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::paths;
+
+    #[test]
+    fn every_scene_has_a_path_and_no_scene_is_there_twice() {
+        for (k, scene) in SCENES.iter().enumerate() {
+            assert!(paths::find(scene.path).is_some(), "{scene:?}");
+            assert!(!SCENES[..k].contains(scene), "{scene:?}");
+        }
+    }
+
+    #[test]
+    fn the_peers_protocol_is_in() {
+        for side in [2049, 4097] {
+            let found = SCENES.iter().find(|s| s.kind == Kind::Peers && s.side == side).unwrap();
+            assert_eq!((found.seed, found.path, found.frames, found.every), (1, "fly", 120, 10));
+        }
+        assert_eq!((WARM_UP, SIZE), (20, [1280, 720]));
+    }
+
+    /// The list is what its version says: whoever changes a scene changes the version and this number with it.
+    #[test]
+    fn a_change_of_the_list_needs_another_version() {
+        let text = format!("{SCENES:?} {WARM_UP} {SIZE:?} {REAL_PATHS:?}");
+        let sum = text.bytes().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+        assert_eq!((VERSION, sum), (1, 0));
+    }
+}

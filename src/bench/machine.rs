@@ -1,0 +1,49 @@
+//! The computer that a benchmark ran on, and the memory that the process has held.
+
+use std::fs;
+
+use super::rows::Machine;
+
+impl Machine {
+    /// This one.
+    pub fn this() -> Self {
+        let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
+        Self {
+            cpu: cpu.unwrap_or_else(|| "unknown".to_string()),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        }
+    }
+}
+
+/// The most memory that this process has held, bytes; `None` where the system does not say.
+pub fn host_bytes() -> Option<u64> {
+    let kilobytes = field(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM")?;
+    kilobytes.trim_end_matches(" kB").parse::<u64>().ok().map(|n| n * 1024)
+}
+
+/// The first value of a key in lines `key: value`.
+fn field(text: &str, key: &str) -> Option<String> {
+    let lines = text.lines().filter_map(|line| line.split_once(':'));
+    lines.into_iter().find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_found_by_their_whole_name() {
+        let text = "processor\t: 0\nmodel\t\t: 143\nmodel name\t: Fast One @ 3 GHz: x\n\nmodel name\t: Slow One\n";
+        assert_eq!(field(text, "model name").as_deref(), Some("Fast One @ 3 GHz: x"));
+        assert_eq!(field(text, "name"), None);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn memory_held_counts() {
+        let before = host_bytes().unwrap();
+        let held = vec![1u8; 64 << 20];
+        assert!(host_bytes().unwrap() >= before.max(held.iter().map(|&b| u64::from(b)).sum()));
+    }
+}

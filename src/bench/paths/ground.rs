@@ -1,0 +1,79 @@
+//! The land under a path: heights anywhere, and the lengths that paths are measured in.
+
+use crate::height::Field;
+
+/// A height above ground that shows a valley and its flanks, metres.
+const ALTITUDE_M: f64 = 300.0;
+/// Where a person's eyes are, metres above ground.
+const EYE_M: f64 = 1.7;
+
+/// A field as something to fly over.
+pub struct Ground<'a> {
+    /// The field.
+    pub field: &'a Field,
+    /// Lowest and highest height, metres.
+    pub range: [f64; 2],
+}
+
+impl<'a> Ground<'a> {
+    /// The ground of a field.
+    pub fn of(field: &'a Field) -> Self {
+        let statistics = field.statistics();
+        Self { field, range: [statistics.min.into(), statistics.max.into()] }
+    }
+
+    /// Height at a world position (x, z), bilinear; outside, that of the border. Holes are filled.
+    pub fn height(&self, at: [f64; 2]) -> f64 {
+        let [u, v] = [0, 1].map(|k| (at[k] - self.field.origin[k]) / self.field.spacing[k]);
+        self.height_of_sample([u, v])
+    }
+
+    /// Height at a position in samples, bilinear; outside, that of the border.
+    pub fn height_of_sample(&self, at: [f64; 2]) -> f64 {
+        let last = self.field.size().map(|n| n - 1);
+        let clamped = [0, 1].map(|k| at[k].clamp(0.0, f64::from(last[k])));
+        let low = [0, 1].map(|k| (clamped[k] as u32).min(last[k] - 1));
+        let [u, v] = [0, 1].map(|k| clamped[k] - f64::from(low[k]));
+        let height = |i: u32, j: u32| f64::from(self.field.height(low[0] + i, low[1] + j));
+        (height(0, 0) * (1.0 - u) + height(1, 0) * u) * (1.0 - v) + (height(0, 1) * (1.0 - u) + height(1, 1) * u) * v
+    }
+
+    /// World position (x, z) of a place given in parts of the field's extent.
+    pub fn place(&self, u: f64, v: f64) -> [f64; 2] {
+        let size = self.field.size();
+        let parts = [u, v];
+        [0, 1].map(|k| self.field.origin[k] + parts[k] * f64::from(size[k] - 1) * self.field.spacing[k])
+    }
+
+    /// World position (x, z) of the highest of about 65 000 samples.
+    pub fn summit(&self) -> [f64; 2] {
+        let [w, h] = self.field.size();
+        let step = [w, h].map(|n| n.div_ceil(256) as usize);
+        let places = (0..h).step_by(step[1]).flat_map(|j| (0..w).step_by(step[0]).map(move |i| [i, j]));
+        let highest = places.max_by(|a, b| self.field.height(a[0], a[1]).total_cmp(&self.field.height(b[0], b[1])));
+        let [i, j] = highest.unwrap_or([0, 0]);
+        let at = self.field.world(i, j);
+        [at.x, at.z]
+    }
+
+    /// The shorter side, metres.
+    pub fn extent(&self) -> f64 {
+        let (low, high) = (self.place(0.0, 0.0), self.place(1.0, 1.0));
+        (high[0] - low[0]).min(high[1] - low[1])
+    }
+
+    /// 300 m, or less over a small field, metres above ground.
+    pub fn altitude(&self) -> f64 {
+        ALTITUDE_M.min(self.extent() / 4.0)
+    }
+
+    /// A person's eyes, lower over a small field, metres above ground.
+    pub fn eye_height(&self) -> f64 {
+        EYE_M.min(self.extent() / 50.0)
+    }
+
+    /// The near plane, metres: a tenth, or less over a small field.
+    pub fn near(&self) -> f64 {
+        0.1f64.min(self.extent() / 1000.0)
+    }
+}

@@ -1,0 +1,214 @@
+//! `results.json` and `results.csv`: the rows of a directory, summed up case by case.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::journal;
+use super::rows::{Case, Errors, Header, Row, SCHEMA, Times};
+use super::statistics::{Estimate, middle};
+use crate::height::save::replace;
+
+/// Name of the file with everything.
+pub const RESULTS: &str = "results.json";
+/// Name of the table with a line a case.
+pub const TABLE: &str = "results.csv";
+
+/// Everything a benchmark found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// What all cases have in common.
+    pub header: Header,
+    /// Case by case, in the order in which they were first run.
+    pub cases: Vec<CaseResult>,
+}
+
+/// What one case took and what was wrong with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaseResult {
+    /// What was drawn and how.
+    pub case: Case,
+    /// The rounds summed up; `None` if it was not timed.
+    pub time: Option<TimeSummary>,
+    /// Its errors, if they were measured.
+    pub errors: Option<Errors>,
+    /// Round by round.
+    pub rounds: Vec<Times>,
+}
+
+/// All rounds of a case. Each value is the median over the rounds of what a round says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimeSummary {
+    /// Median frame time, milliseconds, with its bootstrap 95 % interval.
+    pub frame_ms: Estimate,
+    /// 95th percentile of the frame times, milliseconds.
+    pub frame_p95_ms: f64,
+    /// 99th percentile.
+    pub frame_p99_ms: f64,
+    /// The longest frame of a round.
+    pub frame_max_ms: f64,
+    /// Median selection time, milliseconds.
+    pub select_ms: f64,
+    /// Median recording time, milliseconds.
+    pub record_ms: f64,
+    /// Median device time, milliseconds.
+    pub gpu_ms: Option<f64>,
+    /// Median time of copying to the device, milliseconds.
+    pub upload_ms: Option<f64>,
+    /// Median time of the same picture in one full-screen pass, milliseconds.
+    pub floor_ms: Option<f64>,
+    /// Frame time over the floor's, pair by pair within a round.
+    pub over_floor: Option<Estimate>,
+    /// Frame time over the base case's of the same scene, pair by pair within a round.
+    pub over_base: Option<Estimate>,
+    /// Hitches in a hundred frames.
+    pub hitches_percent: f64,
+    /// Mean triangles a frame.
+    pub triangles: f64,
+    /// Mean draws a frame.
+    pub draws: f64,
+    /// Mean draw commands a frame.
+    pub commands: f64,
+    /// Device bytes, all purposes together.
+    pub device_bytes: u64,
+}
+
+impl Results {
+    /// Sums rows up. A row that is there twice counts once: the first time.
+    pub fn of(header: Header, rows: &[Row]) -> Self {
+        let mut cases: Vec<CaseResult> = Vec::new();
+        for row in rows {
+            match row {
+                Row::Header(_) => {}
+                Row::Time(row) => {
+                    let result = entry(&mut cases, &row.case);
+                    if result.rounds.iter().all(|round| round.round != row.times.round) {
+                        result.rounds.push(row.times.clone());
+                    }
+                }
+                Row::Error(row) => {
+                    entry(&mut cases, &row.case).errors.get_or_insert_with(|| row.errors.clone());
+                }
+            }
+        }
+        let summaries: Vec<_> = cases.iter().map(|case| summary(case, base_of(case, &cases, &header.base))).collect();
+        for (case, summary) in cases.iter_mut().zip(summaries) {
+            case.time = summary;
+        }
+        Self { schema: SCHEMA, header, cases }
+    }
+
+    /// Sums the rows of a directory up.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let (header, rows) = journal::read(folder)?;
+        Ok(Self::of(header, &rows))
+    }
+}
+
+fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult {
+    let at = cases.iter().position(|result| result.case == *case).unwrap_or_else(|| {
+        cases.push(CaseResult { case: case.clone(), time: None, errors: None, rounds: Vec::new() });
+        cases.len() - 1
+    });
+    &mut cases[at]
+}
+
+/// The base case of a case's scene.
+fn base_of<'a>(of: &CaseResult, cases: &'a [CaseResult], base: &str) -> Option<&'a CaseResult> {
+    cases.iter().find(|result| result.case.technique == base && result.case.scene() == of.case.scene())
+}
+
+fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary> {
+    let rounds = &result.rounds;
+    if rounds.is_empty() {
+        return None;
+    }
+    let over = |of: fn(&Times) -> f64| middle(rounds.iter().map(of));
+    let measured = |of: fn(&Times) -> Option<f64>| -> Option<f64> {
+        rounds.iter().map(of).collect::<Option<Vec<_>>>().map(middle)
+    };
+    let ratios: Vec<f64> = base.map(|base| pairs(rounds, &base.rounds)).unwrap_or_default();
+    let floors: Option<Vec<f64>> = rounds.iter().map(|r| r.floor_ms.map(|floor| r.frame_ms.p50 / floor.p50)).collect();
+    let frames = (rounds.len() * result.case.frames).max(1);
+    Some(TimeSummary {
+        frame_ms: Estimate::median(&rounds.iter().map(|r| r.frame_ms.p50).collect::<Vec<_>>()),
+        frame_p95_ms: over(|r| r.frame_ms.p95),
+        frame_p99_ms: over(|r| r.frame_ms.p99),
+        frame_max_ms: over(|r| r.frame_ms.max),
+        select_ms: over(|r| r.select_ms.p50),
+        record_ms: over(|r| r.record_ms.p50),
+        gpu_ms: measured(|r| r.gpu_ms.map(|p| p.p50)),
+        upload_ms: measured(|r| r.upload_ms.map(|p| p.p50)),
+        floor_ms: measured(|r| r.floor_ms.map(|p| p.p50)),
+        over_floor: floors.map(|ratios| Estimate::median(&ratios)),
+        over_base: (!ratios.is_empty()).then(|| Estimate::median(&ratios)),
+        hitches_percent: 100.0 * rounds.iter().map(|r| r.hitches).sum::<usize>() as f64 / frames as f64,
+        triangles: over(|r| r.triangles.mean),
+        draws: over(|r| r.draws.mean),
+        commands: over(|r| r.commands.mean),
+        device_bytes: rounds.iter().map(|r| r.device_bytes.values().sum()).max().unwrap_or(0),
+    })
+}
+
+/// Frame time over the base's, round by round where both have the round.
+fn pairs(rounds: &[Times], base: &[Times]) -> Vec<f64> {
+    let partner = |round: usize| base.iter().find(|other| other.round == round);
+    rounds.iter().filter_map(|r| partner(r.round).map(|other| r.frame_ms.p50 / other.frame_ms.p50)).collect()
+}
+
+/// Writes both files from the rows of a directory and returns the path of `results.json`.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let results = Results::read(folder)?;
+    let path = folder.join(RESULTS);
+    let text = serde_json::to_string_pretty(&results)? + "\n";
+    save(&path, text.as_bytes())?;
+    save(&folder.join(TABLE), &table(&results)?)?;
+    Ok(path)
+}
+
+/// Writes a file whole or leaves what was there.
+pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace(path, |out| out.write_all(bytes)).with_context(|| path.display().to_string())
+}
+
+/// A line a case: every single value of it, under its path in `results.json`.
+fn table(results: &Results) -> Result<Vec<u8>> {
+    let mut lines: Vec<Vec<(String, String)>> = Vec::new();
+    let mut columns: Vec<String> = Vec::new();
+    for result in &results.cases {
+        let mut cells = Vec::new();
+        flatten("", &serde_json::to_value(CaseResult { rounds: Vec::new(), ..result.clone() })?, &mut cells);
+        for (name, _) in &cells {
+            if !columns.contains(name) {
+                columns.push(name.clone());
+            }
+        }
+        lines.push(cells);
+    }
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(&columns)?;
+    for cells in lines {
+        let cell = |column: &String| cells.iter().find(|(name, _)| name == column).map_or("", |(_, value)| value);
+        writer.write_record(columns.iter().map(cell))?;
+    }
+    Ok(writer.into_inner()?)
+}
+
+/// Single values by their path; lists of anything but numbers have no place in a line.
+fn flatten(path: &str, value: &Value, cells: &mut Vec<(String, String)>) {
+    let below = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
+    match value {
+        Value::Object(fields) => fields.iter().for_each(|(name, value)| flatten(&below(name), value, cells)),
+        Value::Array(items) if items.iter().all(Value::is_number) => {
+            items.iter().enumerate().for_each(|(k, item)| flatten(&below(&k.to_string()), item, cells));
+        }
+        Value::Array(_) | Value::Null => {}
+        Value::String(text) => cells.push((path.to_string(), text.clone())),
+        other => cells.push((path.to_string(), other.to_string())),
+    }
+}

@@ -1,0 +1,250 @@
+//! The driver: which case is drawn when, and what becomes of it. Cases of one scene take turns within a round
+//! (A B A B …), so that what slows the machine down for a while slows all of them; the frames before the path begins
+//! are dropped; every row is on the disk before the next is begun.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result, ensure};
+
+use super::journal::Journal;
+use super::machine::host_bytes;
+use super::paths::{self, Pose};
+use super::results;
+use super::rows::{Case, Device, ErrorRow, Errors, Header, Plan, Row, Terrain, TimeRow, Times};
+use super::statistics::{Percentiles, Spread};
+use crate::height::Field;
+use crate::view::{Metric, Tolerance, View};
+
+/// A frame of more than so many medians is a hitch.
+const HITCH: f64 = 2.0;
+
+/// One case as a laboratory gets it.
+pub struct Scene<'a> {
+    /// What is drawn and how.
+    pub case: &'a Case,
+    /// The field.
+    pub field: &'a Arc<Field>,
+    /// A view a frame, in order.
+    pub views: &'a [View],
+    /// The folder for pictures: file names in [`Errors`] are relative to it.
+    pub folder: &'a Path,
+}
+
+/// What one frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// From the start of selection until the picture is done, milliseconds.
+    pub frame_ms: f64,
+    /// Selection, milliseconds.
+    pub select_ms: f64,
+    /// Recording of commands, milliseconds.
+    pub record_ms: f64,
+    /// The device, milliseconds.
+    pub gpu_ms: Option<f64>,
+    /// Copying to the device, milliseconds.
+    pub upload_ms: Option<f64>,
+    /// The same pose with the same fragment work in one full-screen pass, milliseconds.
+    pub floor_ms: Option<f64>,
+    /// Triangles drawn.
+    pub triangles: u64,
+    /// Vertices run.
+    pub vertices: Option<u64>,
+    /// Draws of the list.
+    pub draws: u64,
+    /// Draw commands recorded.
+    pub commands: u64,
+}
+
+/// What drawing a scene once took.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timed {
+    /// One a view.
+    pub frames: Vec<Frame>,
+    /// Device bytes by purpose, the most of any frame.
+    pub device_bytes: BTreeMap<String, u64>,
+}
+
+/// Whoever draws. A laboratory may keep what it made for a scene; it is called for the scenes in turn.
+pub trait Laboratory {
+    /// The device, and the plan of each terrain's scene.
+    fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)>;
+
+    /// Draws every view once, in order, beginning with the technique as it is when it has just been made.
+    fn time(&mut self, scene: &Scene) -> Result<Timed>;
+
+    /// Draws every view once, in order, and measures the frames 0, [`Case::every`], 2 · [`Case::every`], …
+    fn measure(&mut self, scene: &Scene) -> Result<Errors>;
+}
+
+/// What is to be run.
+pub struct Run<'a> {
+    /// Where rows, results and pictures go.
+    pub folder: &'a Path,
+    /// The cases; those of one scene stand in the order in which they take turns.
+    pub cases: Vec<Case>,
+    /// The fields of the cases.
+    pub fields: Vec<(Terrain, Arc<Field>)>,
+    /// How often each case is timed.
+    pub rounds: usize,
+    /// Frames drawn before the path begins, from its first pose.
+    pub warm_up: usize,
+    /// Set from outside to end the run after the row at hand.
+    pub stop: &'a AtomicBool,
+}
+
+/// Where a run is.
+pub struct Step<'a> {
+    /// Rows written, and rows of the whole run.
+    pub done: [usize; 2],
+    /// What comes next.
+    pub case: &'a Case,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// Every row is there.
+    Complete,
+    /// It was stopped; the same command goes on.
+    Stopped,
+}
+
+/// One row to be written.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    case: &'a Case,
+    /// The round to time, or the errors.
+    round: Option<usize>,
+}
+
+impl Run<'_> {
+    /// Runs what is not there yet and writes the results, also when stopped or when a case fails.
+    pub fn run(&self, laboratory: &mut dyn Laboratory, header: Header, at: &mut dyn FnMut(Step)) -> Result<Ended> {
+        let mut journal = Journal::open(self.folder, header)?;
+        let ended = self.missing_rows(laboratory, &mut journal, at);
+        results::write(self.folder)?;
+        ended
+    }
+
+    fn missing_rows(
+        &self,
+        laboratory: &mut dyn Laboratory,
+        journal: &mut Journal,
+        at: &mut dyn FnMut(Step),
+    ) -> Result<Ended> {
+        let tasks = self.tasks();
+        let mut flights = Flights::default();
+        for (k, task) in tasks.iter().enumerate() {
+            if journal.rows().iter().any(|row| task.is_done_by(row)) {
+                continue;
+            }
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(Ended::Stopped);
+            }
+            at(Step { done: [k, tasks.len()], case: task.case });
+            let row = self.row(laboratory, &mut flights, *task).with_context(|| task.case.to_string())?;
+            journal.append(row)?;
+        }
+        Ok(Ended::Complete)
+    }
+
+    /// Scene by scene: the rounds, in each all cases in turn, then the errors.
+    fn tasks(&self) -> Vec<Task<'_>> {
+        let mut scenes: Vec<String> = self.cases.iter().map(Case::scene).collect();
+        let mut seen = std::collections::BTreeSet::new();
+        scenes.retain(|scene| seen.insert(scene.clone()));
+        let rounds: Vec<_> = (0..self.rounds).map(Some).chain([None]).collect();
+        let of_scene = |scene: &String| {
+            let cases: Vec<_> = self.cases.iter().filter(|case| case.scene() == *scene).collect();
+            rounds.iter().flat_map(|&round| cases.iter().map(move |&case| Task { case, round })).collect::<Vec<_>>()
+        };
+        scenes.iter().flat_map(of_scene).collect()
+    }
+
+    fn row(&self, laboratory: &mut dyn Laboratory, flights: &mut Flights, task: Task) -> Result<Row> {
+        let case = task.case;
+        let (_, field) = self.fields.iter().find(|(terrain, _)| *terrain == case.terrain).context("no such terrain")?;
+        let views = flights.views(case, field)?;
+        let Some(round) = task.round else {
+            let scene = Scene { case, field, views: &views, folder: self.folder };
+            return Ok(Row::Error(ErrorRow { case: case.clone(), errors: laboratory.measure(&scene)? }));
+        };
+        let first = views.first().context("a path has at least one frame")?;
+        let views: Vec<View> = std::iter::repeat_n(*first, self.warm_up).chain(views.iter().copied()).collect();
+        let scene = Scene { case, field, views: &views, folder: self.folder };
+        let mut timed = laboratory.time(&scene)?;
+        let (found, expected) = (timed.frames.len(), views.len());
+        ensure!(found == expected, "{found} frames were timed of {expected}");
+        timed.frames.drain(..self.warm_up);
+        Ok(Row::Time(TimeRow { case: case.clone(), times: Times::of(round, timed) }))
+    }
+}
+
+impl Task<'_> {
+    fn is_done_by(&self, row: &Row) -> bool {
+        match row {
+            Row::Header(_) => false,
+            Row::Time(row) => Some(row.times.round) == self.round && row.case == *self.case,
+            Row::Error(row) => self.round.is_none() && row.case == *self.case,
+        }
+    }
+}
+
+/// The path last flown: the cases of a scene differ in nothing but the tolerance.
+#[derive(Default)]
+struct Flights {
+    scene: String,
+    poses: Vec<Pose>,
+    near: f64,
+}
+
+impl Flights {
+    fn views(&mut self, case: &Case, field: &Field) -> Result<Vec<View>> {
+        if self.scene != case.scene() {
+            let path = paths::find(&case.path).with_context(|| format!("no path {}", case.path))?;
+            (self.scene, self.poses, self.near) = (case.scene(), path.poses(field, case.frames), paths::near(field));
+        }
+        Ok(self.poses.iter().map(|pose| pose.view(case.size, self.near, case.tolerance())).collect())
+    }
+}
+
+impl Case {
+    /// The tolerance under its metric.
+    pub fn tolerance(&self) -> Tolerance {
+        let metric = if self.metric == "paper" { Metric::Paper } else { Metric::Certified };
+        Tolerance { px: self.tolerance_px, metric }
+    }
+}
+
+impl Times {
+    /// Sums one round's frames up.
+    pub fn of(round: usize, timed: Timed) -> Self {
+        let frames = &timed.frames;
+        let times = |of: fn(&Frame) -> f64| Percentiles::of(frames.iter().map(of));
+        let measured = |of: fn(&Frame) -> Option<f64>| -> Option<Percentiles> {
+            frames.iter().map(of).collect::<Option<Vec<_>>>().map(Percentiles::of)
+        };
+        let counts = |of: fn(&Frame) -> u64| Spread::of(frames.iter().map(|frame| of(frame) as f64));
+        let frame_ms = times(|frame| frame.frame_ms);
+        let vertices: Option<Vec<f64>> = frames.iter().map(|frame| frame.vertices.map(|n| n as f64)).collect();
+        Self {
+            round,
+            frame_ms,
+            select_ms: times(|frame| frame.select_ms),
+            record_ms: times(|frame| frame.record_ms),
+            gpu_ms: measured(|frame| frame.gpu_ms),
+            upload_ms: measured(|frame| frame.upload_ms),
+            floor_ms: measured(|frame| frame.floor_ms),
+            hitches: frames.iter().filter(|frame| frame.frame_ms > HITCH * frame_ms.p50).count(),
+            triangles: counts(|frame| frame.triangles),
+            vertices: vertices.map(Spread::of),
+            draws: counts(|frame| frame.draws),
+            commands: counts(|frame| frame.commands),
+            device_bytes: timed.device_bytes,
+            host_bytes: host_bytes(),
+        }
+    }
+}

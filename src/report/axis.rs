@@ -1,0 +1,130 @@
+//! An axis: from values to places on a line, and the ticks between its ends.
+
+/// How values lie on an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Equal steps for equal differences; begins at 0.
+    Linear,
+    /// Equal steps for equal factors.
+    Logarithmic,
+}
+
+/// Decades that a logarithmic axis shows at most; smaller values stand on its lower end.
+const DECADES: f64 = 4.0;
+
+/// One axis of a chart.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What it shows, and in which unit.
+    pub label: String,
+    /// Whether a logarithmic form exists.
+    pub scale: Scale,
+}
+
+/// An axis with its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    scale: Scale,
+    low: f64,
+    high: f64,
+}
+
+impl Range {
+    /// The range around all these values.
+    pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
+        let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+        let high = finite.iter().copied().fold(0.0, f64::max);
+        let smallest = finite.iter().copied().filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
+        match scale {
+            Scale::Linear => {
+                let top = if high > 0.0 { high } else { 1.0 };
+                let step = step(top);
+                Self { scale, low: 0.0, high: (top * 1.02 / step).ceil() * step }
+            }
+            Scale::Logarithmic if smallest.is_finite() => {
+                let low = smallest.max(high / 10f64.powf(DECADES));
+                Self { scale, low: round_down(low / 1.05), high: round_up(high * 1.05) }
+            }
+            Scale::Logarithmic => Self { scale, low: 0.1, high: 1.0 },
+        }
+    }
+
+    /// Where a value lies: 0 at the lower end, 1 at the upper; values beyond lie on the ends.
+    pub fn place(&self, value: f64) -> f64 {
+        let part = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Logarithmic => (value.max(self.low) / self.low).ln() / (self.high / self.low).ln(),
+        };
+        if part.is_nan() { 1.0 } else { part.clamp(0.0, 1.0) }
+    }
+
+    /// Values worth a line, from below.
+    pub fn ticks(&self) -> Vec<f64> {
+        match self.scale {
+            Scale::Linear => {
+                let step = step(self.high);
+                (0..).map(|k| f64::from(k) * step).take_while(|v| *v <= self.high * 1.0001).collect()
+            }
+            Scale::Logarithmic => {
+                let wide = (self.high / self.low).log10() > 2.2;
+                let marks: &[f64] = if wide { &[1.0] } else { &[1.0, 2.0, 5.0] };
+                let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+                let all = decades.flat_map(|d| marks.iter().map(move |m| m * 10f64.powi(d)));
+                all.filter(|v| (self.low * 0.999..=self.high * 1.001).contains(v)).collect()
+            }
+        }
+    }
+}
+
+/// A round step of which between four and eight make the way up to `high`.
+fn step(high: f64) -> f64 {
+    let rough = high / 4.0;
+    let decade = 10f64.powf(rough.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|s| *s <= rough).unwrap_or(decade)
+}
+
+const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+
+fn round_down(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    MARKS.iter().rev().map(|m| m * decade).find(|v| *v <= value * 1.0001).unwrap_or(decade)
+}
+
+fn round_up(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    MARKS.iter().map(|m| m * decade).find(|v| *v >= value * 0.9999).unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_are_round_and_hold_all_values() {
+        let range = Range::around(Scale::Logarithmic, [0.3, 7.0, 42.0].into_iter());
+        assert_eq!((range.low, range.high), (0.2, 50.0));
+        let range = Range::around(Scale::Linear, [3.0, 7.3].into_iter());
+        assert_eq!((range.low, range.high), (0.0, 8.0));
+        assert_eq!(range.ticks(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+        assert_eq!(Range::around(Scale::Logarithmic, [1.0, 1000.0].into_iter()).ticks(), [1.0, 10.0, 100.0, 1000.0]);
+    }
+
+    #[test]
+    fn zero_and_infinity_lie_on_the_ends_and_do_not_stretch_the_axis() {
+        for scale in [Scale::Linear, Scale::Logarithmic] {
+            let range = Range::around(scale, [0.0, 1e-9, 4.0, f64::INFINITY].into_iter());
+            assert_eq!((range.place(0.0), range.place(f64::INFINITY)), (0.0, 1.0));
+            assert!(range.place(4.0) > 0.5 && range.low >= 0.0 && (scale == Scale::Linear || range.low > 1e-5));
+        }
+        for empty in [Scale::Linear, Scale::Logarithmic] {
+            assert!(Range::around(empty, std::iter::empty()).ticks().len() > 1);
+        }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_gives_equal_factors_equal_room() {
+        let range = Range::around(Scale::Logarithmic, [1.0, 100.0].into_iter());
+        let gap = |a, b| range.place(b) - range.place(a);
+        assert!((gap(2.0, 4.0) - gap(20.0, 40.0)).abs() < 1e-12 && gap(2.0, 4.0) > 0.0);
+    }
+}

@@ -1,0 +1,290 @@
+//! A chart of points as SVG: for the page, where classes give the colours and scripts find the points, and as a file
+//! of its own, which says its title, legend and colours itself.
+
+use std::fmt::Write;
+
+use super::axis::{Axis, Range, Scale};
+use super::html::{escape, number};
+
+/// Size of a chart, chosen so that its text is legible on a telephone and in half a window.
+pub const WIDTH: f64 = 440.0;
+const HEIGHT: f64 = 300.0;
+const LEFT: f64 = 58.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 12.0;
+const BOTTOM: f64 = 46.0;
+/// Room that a file gives to its title, and to each line of the legend.
+const TITLE: f64 = 26.0;
+const LEGEND: f64 = 18.0;
+
+/// Line and marker colours of a file, and of the page in the light (Okabe and Ito 2008, told apart by colour-blind
+/// readers too; yellow is left out, it is too light on white).
+pub const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555"];
+/// The same, told apart by shape.
+const MARKERS: [&str; 7] = [
+    "M-4.5 0a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0 -9 0z",
+    "M-4 -4h8v8h-8z",
+    "M0 -5.2l5 8.8h-10z",
+    "M0 -5.6l5.2 5.6l-5.2 5.6l-5.2 -5.6z",
+    "M0 5.2l5 -8.8h-10z",
+    "M-1.6 -5h3.2v3.4h3.4v3.2h-3.4v3.4h-3.2v-3.4h-3.4v-3.2h3.4z",
+    "M-2.5 -4.6h5l2.6 4.6l-2.6 4.6h-5l-2.6 -4.6z",
+];
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// What it shows, in a few words.
+    pub title: String,
+    /// How to read it, in a sentence.
+    pub about: String,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// What is shown.
+    pub series: Vec<Series>,
+    /// A line through points that belong together across the series.
+    pub guide: Option<Guide>,
+    /// A horizontal line with its name.
+    pub limit: Option<(f64, String)>,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name.
+    pub name: String,
+    /// Number of its colour and marker.
+    pub style: usize,
+    /// Its points, joined in this order.
+    pub points: Vec<Point>,
+}
+
+/// One point.
+#[derive(Clone, Debug, Default)]
+pub struct Point {
+    /// To the right.
+    pub x: f64,
+    /// Upwards.
+    pub y: f64,
+    /// The interval of y.
+    pub interval: Option<[f64; 2]>,
+    /// What it is and what its values are.
+    pub label: String,
+    /// Whether it is marked.
+    pub marked: bool,
+}
+
+/// A line of its own.
+#[derive(Clone, Debug)]
+pub struct Guide {
+    /// Its name.
+    pub name: String,
+    /// Its points.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// How the axes of one drawing are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As each axis is by itself.
+    Own,
+    /// All linear.
+    Linear,
+}
+
+/// The marker of a style, for legends.
+pub fn swatch(style: usize) -> String {
+    let k = style % COLOURS.len();
+    format!(
+        "<svg class=\"swatch s{k}\" viewBox=\"-7 -7 14 14\" aria-hidden=\"true\"><path d=\"{}\"/></svg>",
+        MARKERS[k]
+    )
+}
+
+impl Chart {
+    /// Whether there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.series.iter().all(|series| series.points.is_empty())
+    }
+
+    /// Whether the linear form differs from the own one.
+    pub fn has_logarithm(&self) -> bool {
+        [&self.x, &self.y].iter().any(|axis| axis.scale == Scale::Logarithmic)
+    }
+
+    /// For the page.
+    pub fn inline(&self, form: Form) -> String {
+        let class = if form == Form::Own { "own" } else { "linear" };
+        format!(
+            "<svg class=\"chart {class}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"group\" aria-label=\"{}\">{}</svg>",
+            escape(&self.title),
+            self.body(form)
+        )
+    }
+
+    /// As a file of its own.
+    pub fn file(&self) -> String {
+        let names = self.series.iter().map(|s| (s.style, s.name.as_str()));
+        let legend: String = names.enumerate().map(|(k, (style, name))| legend_line(k, style, name)).collect();
+        let height = TITLE + HEIGHT + LEGEND * self.series.len() as f64 + 6.0;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\">\
+             <style>{}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\
+             <text class=\"title\" x=\"{LEFT}\" y=\"19\">{}</text>\
+             <g transform=\"translate(0 {TITLE})\">{}</g><g transform=\"translate({LEFT} {})\">{legend}</g></svg>\n",
+            style_of_files(),
+            escape(&self.title),
+            self.body(Form::Own),
+            TITLE + HEIGHT + 8.0
+        )
+    }
+
+    fn body(&self, form: Form) -> String {
+        let frame = Frame::of(self, form);
+        let mut svg = frame.grid(self);
+        if let Some((value, name)) = &self.limit {
+            let y = frame.y(*value);
+            let _ = write!(
+                svg,
+                "<path class=\"limit\" d=\"M{LEFT} {y:.1}H{:.1}\"/><text class=\"note\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                WIDTH - RIGHT,
+                WIDTH - RIGHT - 4.0,
+                y - 5.0,
+                escape(name)
+            );
+        }
+        if let Some(guide) = &self.guide {
+            let line = frame.line(guide.points.iter().map(|p| (p[0], p[1])));
+            let _ = write!(svg, "<path class=\"guide\" d=\"{line}\"><title>{}</title></path>", escape(&guide.name));
+        }
+        self.series.iter().for_each(|series| svg += &frame.series(series));
+        svg
+    }
+
+    fn values(&self, of: fn(&Point) -> f64) -> impl Iterator<Item = f64> {
+        self.series.iter().flat_map(move |series| series.points.iter().map(of))
+    }
+}
+
+/// The axes of one drawing.
+struct Frame {
+    x: Range,
+    y: Range,
+}
+
+impl Frame {
+    fn of(chart: &Chart, form: Form) -> Self {
+        let scale = |axis: &Axis| if form == Form::Own { axis.scale } else { Scale::Linear };
+        let guides = chart.guide.iter().flat_map(|guide| guide.points.iter());
+        let limit = chart.limit.iter().map(|(value, _)| *value);
+        let tops = chart.values(|p| p.interval.map_or(p.y, |i| i[1]));
+        let x = Range::around(scale(&chart.x), chart.values(|p| p.x).chain(guides.clone().map(|p| p[0])));
+        let y =
+            Range::around(scale(&chart.y), chart.values(|p| p.y).chain(tops).chain(limit).chain(guides.map(|p| p[1])));
+        Self { x, y }
+    }
+
+    fn x(&self, value: f64) -> f64 {
+        LEFT + self.x.place(value) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        HEIGHT - BOTTOM - self.y.place(value) * (HEIGHT - TOP - BOTTOM)
+    }
+
+    fn line(&self, points: impl Iterator<Item = (f64, f64)>) -> String {
+        let step = |(k, (x, y))| format!("{}{:.1} {:.1}", if k == 0 { 'M' } else { 'L' }, self.x(x), self.y(y));
+        points.enumerate().map(step).collect()
+    }
+
+    /// Lines, their values and the axes' names.
+    fn grid(&self, chart: &Chart) -> String {
+        let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
+        let mut svg = String::new();
+        for tick in self.x.ticks() {
+            let x = self.x(tick);
+            let text = escape(&number(tick));
+            let _ = write!(
+                svg,
+                "<path class=\"grid\" d=\"M{x:.1} {TOP}V{bottom}\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{text}</text>",
+                bottom + 16.0
+            );
+        }
+        for tick in self.y.ticks() {
+            let y = self.y(tick);
+            let text = escape(&number(tick));
+            let _ = write!(
+                svg,
+                "<path class=\"grid\" d=\"M{LEFT} {y:.1}H{right}\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{text}</text>",
+                LEFT - 6.0,
+                y + 4.0
+            );
+        }
+        let (middle_x, middle_y) = ((LEFT + right) / 2.0, (TOP + bottom) / 2.0);
+        let _ = write!(
+            svg,
+            "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>\
+             <text class=\"name\" x=\"{middle_x}\" y=\"{}\" text-anchor=\"middle\">{}</text>\
+             <text class=\"name\" transform=\"translate(13 {middle_y}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            HEIGHT - 8.0,
+            escape(&chart.x.label),
+            escape(&chart.y.label)
+        );
+        svg
+    }
+
+    fn series(&self, series: &Series) -> String {
+        let k = series.style % COLOURS.len();
+        let line = self.line(series.points.iter().map(|p| (p.x, p.y)));
+        let mut svg = format!(
+            "<g class=\"series s{k}\" data-series=\"{}\"><path class=\"line\" d=\"{line}\"/>",
+            escape(&series.name)
+        );
+        for point in &series.points {
+            svg += &self.point(point, k);
+        }
+        svg + "</g>"
+    }
+
+    fn point(&self, point: &Point, k: usize) -> String {
+        let (x, y) = (self.x(point.x), self.y(point.y));
+        let label = escape(&point.label);
+        let whisker = point.interval.map_or(String::new(), |[low, high]| {
+            let (low, high) = (self.y(low), self.y(high));
+            format!(
+                "<path class=\"whisker\" d=\"M{x:.1} {low:.1}V{high:.1}M{:.1} {low:.1}h6M{:.1} {high:.1}h6\"/>",
+                x - 3.0,
+                x - 3.0
+            )
+        });
+        let ring = if point.marked { "<circle class=\"ring\" r=\"8\"/>" } else { "" };
+        format!(
+            "{whisker}<g class=\"point\" tabindex=\"0\" role=\"img\" aria-label=\"{label}\" data-x=\"{}\" data-y=\"{}\" \
+             transform=\"translate({x:.1} {y:.1})\"><circle class=\"touch\" r=\"11\"/>{ring}<path d=\"{}\"/></g>",
+            point.x, point.y, MARKERS[k]
+        )
+    }
+}
+
+/// One line of a file's legend.
+pub fn legend_line(line: usize, style: usize, name: &str) -> String {
+    let k = style % COLOURS.len();
+    format!(
+        "<g class=\"series s{k}\" transform=\"translate(6 {})\"><path d=\"{}\"/><text x=\"12\" y=\"4\">{}</text></g>",
+        LEGEND * line as f64,
+        MARKERS[k],
+        escape(name)
+    )
+}
+
+/// What the page's style sheet says, for a file of its own.
+pub fn style_of_files() -> String {
+    let colours = COLOURS.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}"));
+    colours.collect::<String>()
+        + "text{font:12px system-ui,sans-serif;fill:#333}.title{font-size:14px;font-weight:600}.series path{fill:currentColor}\
+           .series .line,.whisker{fill:none!important;stroke:currentColor;stroke-width:1.5}.line{opacity:.55}\
+           .grid{stroke:#e3e3e3}.axis{fill:none;stroke:#888}.touch{fill:none}.ring{fill:none;stroke:#333;stroke-width:1.5}\
+           .guide,.limit{fill:none;stroke:#333;stroke-dasharray:4 4}"
+}

@@ -1,0 +1,39 @@
+//! Rows in, pages out: one self-contained `index.html` and an SVG file a figure, drawn from the rows of a benchmark
+//! alone, on any machine, with or without a device.
+
+mod axis;
+mod bars;
+mod chart;
+mod figures;
+mod html;
+mod page;
+mod pictures;
+mod published;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::bench::results::{self, Results};
+use figures::Figures;
+
+/// Name of the page.
+pub const PAGE: &str = "index.html";
+/// Folder of the static figures.
+pub const PLOTS: &str = "plots";
+
+/// Draws the report of a benchmark's directory from its rows and returns the path of the page.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let results = Results::read(folder)?;
+    ensure!(!results.cases.is_empty(), "{}: {}: no rows yet", folder.display(), crate::bench::journal::ROWS);
+    let figures = Figures::of(&results);
+    let plots = folder.join(PLOTS);
+    std::fs::create_dir_all(&plots).with_context(|| plots.display().to_string())?;
+    for (name, svg) in figures.files() {
+        results::save(&plots.join(format!("{name}.svg")), svg.as_bytes())?;
+    }
+    let path = folder.join(PAGE);
+    results::save(&path, page::page(&results, &figures, folder).as_bytes())?;
+    Ok(path)
+}

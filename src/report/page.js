@@ -1,0 +1,51 @@
+"use strict";
+(() => {
+  const all = (selector) => document.querySelectorAll(selector);
+  const tip = document.getElementById("tip");
+
+  // The value of a point, beside it and inside the window.
+  const show = (point) => {
+    const box = point.getBoundingClientRect();
+    tip.textContent = point.getAttribute("aria-label");
+    tip.hidden = false;
+    const left = box.left + box.width / 2 - tip.offsetWidth / 2;
+    const above = box.top - tip.offsetHeight - 8;
+    tip.style.left = Math.max(12, Math.min(left, document.documentElement.clientWidth - tip.offsetWidth - 12)) + "px";
+    tip.style.top = (above > 4 ? above : box.bottom + 8) + "px";
+  };
+  const hide = () => { tip.hidden = true; };
+  all(".point").forEach((point) => {
+    point.addEventListener("pointerenter", () => show(point));
+    point.addEventListener("pointerleave", hide);
+    point.addEventListener("focus", () => show(point));
+    point.addEventListener("blur", hide);
+  });
+  addEventListener("scroll", hide, { passive: true });
+  addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
+
+  const toggle = (box) => {
+    const name = CSS.escape(box.dataset.toggle);
+    all(`[data-series="${name}"]`).forEach((part) => {
+      // SVG elements have no `hidden` of their own.
+      part.toggleAttribute("hidden", !box.checked);
+    });
+  };
+  all("[data-toggle]").forEach((box) => {
+    box.addEventListener("change", () => toggle(box));
+    toggle(box);
+  });
+
+  const logarithm = document.getElementById("logarithm");
+  const axes = () => document.body.classList.toggle("linear-axes", !logarithm.checked);
+  logarithm.addEventListener("change", axes);
+  axes();
+
+  const scene = document.getElementById("scene");
+  const choose = () => all("section.scene").forEach((part) => {
+    part.hidden = scene.value !== "" && part.id !== scene.value;
+  });
+  if (scene) {
+    scene.addEventListener("change", choose);
+    choose();
+  }
+})();

@@ -1,0 +1,174 @@
+//! The page: everything in one file that asks the network for nothing. Without scripts it shows all there is; the
+//! script adds values on hover and focus, the choice of techniques and scenes, and linear axes.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::bars;
+use super::chart::{COLOURS, Chart, Form, swatch};
+use super::figures::{Figures, SceneFigures};
+use super::html::{escape, number, slug};
+use super::{pictures, tables};
+use crate::bench::results::{CaseResult, Results};
+
+/// Colours of the series on dark ground.
+const DARK: [&str; 7] = ["#4aa8e8", "#ff8a3d", "#2fc99a", "#e79bc6", "#8fd0f5", "#f0b93a", "#b5b5b5"];
+
+/// The whole page.
+pub fn page(results: &Results, figures: &Figures, folder: &Path) -> String {
+    let mut body = head(results);
+    body += &controls(figures);
+    for scene in &figures.scenes {
+        body += &section(results, scene, folder);
+    }
+    let _ = write!(
+        body,
+        "<section><h2>Across scenes</h2><div class=\"figures\">{}{}</div></section>",
+        figure(&figures.size, "Only one size of terrain was drawn along one path."),
+        figure(&figures.angle, "No error was measured by angle.")
+    );
+    let _ = write!(
+        body,
+        "<section><h2>Beside what others published</h2><p>Other machines, other data: what compares is the shape, not \
+         the number. A row under our own protocol compares on the same kind of machine only.</p>{}</section>\
+         <section><h2>What the scenes left out</h2>{}</section>",
+        tables::published(results),
+        tables::plans(&results.header.plans)
+    );
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <title>cuesta: error against run time</title><link rel=\"icon\" href=\"data:,\"><style>{}{}</style></head>\
+         <body>{body}<div id=\"tip\" role=\"status\" hidden></div><script>{}</script></body></html>\n",
+        include_str!("page.css"),
+        colours(),
+        include_str!("page.js")
+    )
+}
+
+/// The styles of series and parts, in the light and in the dark.
+fn colours() -> String {
+    let set = |colours: &[&str]| -> String {
+        colours.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}")).collect()
+    };
+    format!("{}{}@media(prefers-color-scheme:dark){{{}}}", bars::style(), set(&COLOURS), set(&DARK))
+}
+
+fn head(results: &Results) -> String {
+    let header = &results.header;
+    let (machine, device) = (&header.machine, &header.device);
+    let software = if device.is_cpu { " (software)" } else { "" };
+    let commit = header.commit.as_ref().map_or("not known".to_string(), |commit| commit.clone());
+    let facts = [
+        ("Device", format!("{}{software}", device.name)),
+        ("Driver", device.driver.clone()),
+        ("Machine", format!("{}, {} threads, {}", machine.cpu, machine.cores, machine.system)),
+        ("Program", format!("cuesta {}, commit {commit}", header.program)),
+        ("Begun", header.date.clone()),
+        ("Asked for", header.arguments.join(" ")),
+    ];
+    let facts: String =
+        facts.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value))).collect();
+    format!("<header><h1>Error against run time</h1><dl>{facts}</dl></header>")
+}
+
+fn controls(figures: &Figures) -> String {
+    let series = |(k, name): (usize, &String)| {
+        let name = escape(name);
+        format!("<label><input type=\"checkbox\" checked data-toggle=\"{name}\">{}{name}</label>", swatch(k))
+    };
+    let series: String = figures.series.iter().enumerate().map(series).collect();
+    let scenes: String = figures
+        .scenes
+        .iter()
+        .map(|s| format!("<option value=\"{}\">{}</option>", slug(&s.name), escape(&s.name)))
+        .collect();
+    let scenes = if figures.scenes.len() > 1 {
+        format!(
+            "<label class=\"scene\">Scene <select id=\"scene\">{scenes}<option value=\"\">all</option></select></label>"
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "<nav aria-label=\"What is shown\">{scenes}<fieldset><legend>Techniques</legend>{series}</fieldset>\
+         <label><input type=\"checkbox\" id=\"logarithm\" checked>Logarithmic axes</label></nav>"
+    )
+}
+
+fn section(results: &Results, scene: &SceneFigures, folder: &Path) -> String {
+    let absent = "Not measured in this run.";
+    let charts: String = scene.charts.iter().map(|(_, chart)| figure(chart, absent)).collect();
+    let split = if scene.split.rows.is_empty() {
+        empty(&scene.split.title, absent)
+    } else {
+        framed(&scene.split.title, &scene.split.about, &scene.split.inline())
+    };
+    format!(
+        "<section class=\"scene\" id=\"{}\"><h2>{}</h2><div class=\"figures\">{charts}{split}</div>\
+         <h3>Every case</h3>{}<h3>The largest errors</h3>{}</section>",
+        slug(&scene.name),
+        escape(&scene.name),
+        tables::cases(results, &scene.name),
+        worst(results, &scene.name, folder)
+    )
+}
+
+fn figure(chart: &Chart, absent: &str) -> String {
+    if chart.is_empty() {
+        return empty(&chart.title, absent);
+    }
+    let mut drawn = chart.inline(Form::Own);
+    if chart.has_logarithm() {
+        drawn += &chart.inline(Form::Linear);
+    }
+    let class = if chart.has_logarithm() { " class=\"two\"" } else { "" };
+    framed(&chart.title, &chart.about, &format!("<div{class}>{drawn}</div>"))
+}
+
+fn framed(title: &str, about: &str, drawn: &str) -> String {
+    format!("<figure><h3>{}</h3>{drawn}<figcaption>{}</figcaption></figure>", escape(title), escape(about))
+}
+
+fn empty(title: &str, why: &str) -> String {
+    format!("<figure class=\"empty\"><h3>{}</h3><p class=\"absent\">{}</p></figure>", escape(title), escape(why))
+}
+
+/// Of each series the case whose worst frame exceeds its tolerance most, with its pictures.
+fn worst(results: &Results, scene: &str, folder: &Path) -> String {
+    let excess = |result: &CaseResult| {
+        let worst = result.errors.as_ref().and_then(|errors| errors.worst.as_ref())?;
+        worst.picture.as_ref().map(|_| worst.error_px / result.case.tolerance_px)
+    };
+    let mut chosen: Vec<&CaseResult> = Vec::new();
+    for result in results.cases.iter().filter(|result| result.case.scene() == scene && excess(result).is_some()) {
+        match chosen.iter_mut().find(|other| other.case.series() == result.case.series()) {
+            Some(other) if excess(result) > excess(other) => *other = result,
+            Some(_) => {}
+            None => chosen.push(result),
+        }
+    }
+    let shown: String = chosen.iter().filter_map(|result| pair(result, folder)).collect();
+    if shown.is_empty() { "<p class=\"absent\">No pictures were kept.</p>".to_string() } else { shown }
+}
+
+/// A case's worst frame and its difference from the truth.
+fn pair(result: &CaseResult, folder: &Path) -> Option<String> {
+    let worst = result.errors.as_ref()?.worst.as_ref()?;
+    let name = format!("{}, {} px", result.case.series(), number(result.case.tolerance_px));
+    let image = |file: &String, what: &str| {
+        let alt = escape(&format!("{name}: {what}"));
+        pictures::data_uri(folder, file).map(|uri| format!("<img alt=\"{alt}\" src=\"{uri}\" loading=\"lazy\">"))
+    };
+    let picture = image(worst.picture.as_ref()?, "as drawn")?;
+    let difference = worst.difference.as_ref().and_then(|file| image(file, "difference from the truth"));
+    Some(format!(
+        "<figure class=\"worst\" data-series=\"{}\"><div>{picture}{}</div><figcaption>{}: frame {}, largest error {} px. \
+         Left or above as drawn, then the difference from the truth.</figcaption></figure>",
+        escape(&result.case.series()),
+        difference.unwrap_or_default(),
+        escape(&name),
+        worst.frame,
+        number(worst.error_px)
+    ))
+}

@@ -1,0 +1,108 @@
+//! Figures that others published, and the best of ours to stand beside each: all of them facts of one data file.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::html::number;
+use crate::bench::results::{CaseResult, Results};
+
+/// One published table.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Authors, year and title.
+    pub source: String,
+    /// Which table or section.
+    pub table: String,
+    /// What its numbers are.
+    pub about: String,
+    /// Machine, picture, data, path.
+    pub conditions: String,
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// Rows.
+    pub rows: Vec<PublishedRow>,
+}
+
+/// One row of a published table.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PublishedRow {
+    /// As published.
+    pub cells: Vec<String>,
+    /// Which of our cases stands beside it.
+    #[serde(default)]
+    pub ours: Option<Rule>,
+}
+
+/// What a case must be like to stand beside a published row; of several the fastest does.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rule {
+    technique: Option<String>,
+    settings: BTreeMap<String, String>,
+    tolerance_px: Option<f64>,
+    terrain: Option<String>,
+    side: Option<u32>,
+    path: Option<String>,
+    /// Most that the 99th percentile of the peers' metric may be, pixels.
+    peers_p99_px: Option<f64>,
+}
+
+/// Every published table.
+pub fn tables() -> Vec<Published> {
+    serde_json::from_str(include_str!("published.json")).expect("the published figures are checked by a test")
+}
+
+impl Rule {
+    fn allows(&self, result: &CaseResult) -> bool {
+        let case = &result.case;
+        let technique = case.technique.split(':').next().unwrap_or_default();
+        let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
+        self.technique.as_deref().is_none_or(|name| name == technique)
+            && self.settings.iter().all(|(key, value)| case.settings.get(key) == Some(value))
+            && self.tolerance_px.is_none_or(|px| px == case.tolerance_px)
+            && self.terrain.as_deref().is_none_or(|name| name == case.terrain.name)
+            && self.side.is_none_or(|side| case.terrain.size == [side; 2])
+            && self.path.as_deref().is_none_or(|path| path == case.path)
+            && self.peers_p99_px.is_none_or(|px| peers.is_some_and(|peers| peers.p99 <= px))
+    }
+
+    /// Ours in words; `None` if no such case was run.
+    pub fn ours(&self, results: &Results) -> Option<String> {
+        let timed =
+            results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)));
+        let (result, time) = timed.min_by(|a, b| a.1.frame_ms.value.total_cmp(&b.1.frame_ms.value))?;
+        let frame_ms = time.frame_ms.value;
+        let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
+        let error = peers
+            .map_or(String::new(), |p| format!("; peers' metric mean {}, p99 {} px", number(p.mean), number(p.p99)));
+        Some(format!(
+            "{} {} px: {} ms ({} fps), {} triangles, {} draws{error}",
+            result.case.series(),
+            number(result.case.tolerance_px),
+            number(frame_ms),
+            number(1000.0 / frame_ms),
+            number(time.triangles),
+            number(time.draws)
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_table_is_whole_and_says_where_it_is_from() {
+        let tables = tables();
+        assert!(tables.len() >= 8);
+        for table in &tables {
+            for text in [&table.source, &table.table, &table.about, &table.conditions] {
+                assert!(!text.is_empty(), "{table:?}");
+            }
+            assert!(table.rows.iter().all(|row| row.cells.len() == table.columns.len()), "{}", table.table);
+        }
+    }
+}
