@@ -1,6 +1,7 @@
 //! All integration tests in one binary; the modules mirror `src/`.
 
 mod architecture;
+mod bench;
 mod cli;
 mod conformance;
 #[cfg(feature = "vulkan")]
@@ -9,6 +10,7 @@ mod height;
 mod lod;
 mod measure;
 mod readme;
+mod report;
 mod synth;
 #[cfg(feature = "viewer")]
 mod viewer;

@@ -19,6 +19,8 @@ pub const THRESHOLD: f64 = 0.1;
 /// What changed.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
+    /// Cases that both have.
+    pub matched: usize,
     /// Times by technique, all its cases together.
     pub techniques: Vec<Change>,
     /// Times by case.
@@ -76,7 +78,7 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let techniques: Vec<_> = pooled.collect();
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
     let regressions = regressions(&techniques, &cases, &differences);
-    Comparison { techniques, cases, differences, unmatched: unmatched(a, b), regressions }
+    Comparison { matched: pairs.len(), techniques, cases, differences, unmatched: unmatched(a, b), regressions }
 }
 
 /// The median frame times of a case's rounds.

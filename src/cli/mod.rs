@@ -1,7 +1,10 @@
 //! The program: one file a subcommand. Names and JSON fields are a contract for scripts.
 
+pub mod bench;
+pub mod cases;
 pub mod export;
 pub mod info;
+pub mod redraw;
 #[cfg(feature = "vulkan")]
 pub mod render;
 pub mod report;
@@ -57,6 +60,10 @@ pub enum Command {
     /// The window.
     #[cfg(feature = "viewer")]
     View(view::ViewerArgs),
+    /// Error against run time: every technique at every tolerance along named paths.
+    Bench(bench::BenchArgs),
+    /// The report of a benchmark, drawn again from its rows.
+    Report(redraw::ReportArgs),
     /// A synthetic field.
     Synth(synth::SynthArgs),
 }
@@ -104,6 +111,8 @@ fn run(cli: Cli) -> Result<Outcome> {
         Some(Command::Export(args)) => export::run(&common, &args),
         #[cfg(feature = "viewer")]
         Some(Command::View(args)) => view::run(&common, &args),
+        Some(Command::Bench(args)) => bench::run(&common, &args),
+        Some(Command::Report(args)) => redraw::run(&common, &args),
         Some(Command::Synth(args)) => synth::run(&common, &args),
         None => without_subcommand(&common),
     }

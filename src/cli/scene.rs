@@ -180,7 +180,7 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     pair.ok().filter(|s| s.iter().all(|&n| n > 0)).ok_or_else(|| "expected WxH, as in 1280x720".to_string())
 }
 
-fn key_value(text: &str) -> Result<(String, String), String> {
+pub(super) fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     Ok((key.trim().to_string(), value.trim().to_string()))
 }

@@ -115,18 +115,16 @@ fn lifted(ground: &Ground, mut pose: Pose) -> Pose {
     pose
 }
 
-/// Places and headings uniform, heights above ground uniform in their logarithm; looking towards the middle, so
-/// that there is land to see.
+/// Places uniform, heights above ground uniform in their logarithm, looking at a place in the inner half of the field.
 pub fn teleport(ground: &Ground, frames: usize) -> Vec<Pose> {
     let mut random = Random(1);
-    let middle = ground.place(0.5, 0.5);
     let pose = |_: usize| {
         let at = ground.place(0.02 + 0.96 * random.next(), 0.02 + 0.96 * random.next());
         let (low, high) = (ground.eye_height(), ground.extent() / 2.0);
         let eye = above(ground, at, low * (high / low).powf(random.next()));
-        let inwards = angles(DVec3::new(middle[0] - at[0], 0.0, middle[1] - at[1])).0;
-        let yaw = inwards + 60.0 * (random.next() - 0.5);
-        Pose { eye, yaw, pitch: -5.0 - 40.0 * random.next(), opening: OPENING }
+        let target = ground.place(0.25 + 0.5 * random.next(), 0.25 + 0.5 * random.next());
+        let (yaw, pitch) = angles(above(ground, target, 0.0) - eye);
+        Pose { eye, yaw, pitch, opening: OPENING }
     };
     (0..frames).map(pose).collect()
 }

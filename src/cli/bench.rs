@@ -1,0 +1,193 @@
+//! `cuesta bench`: error against run time along named paths; `cuesta bench compare`: what changed.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+use super::cases::{Choice, Planned};
+use super::scene::{ReadArgs, size};
+use super::{Common, Outcome, report};
+use crate::bench::compare::{THRESHOLD, compare};
+use crate::bench::results::{RESULTS, Results};
+use crate::bench::rows::{Header, Machine};
+use crate::bench::run::{Ended, Run};
+use crate::bench::{Laboratory, SCHEMA};
+
+/// Arguments.
+#[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct BenchArgs {
+    /// Something else than measuring.
+    #[command(subcommand)]
+    pub action: Option<Action>,
+    /// What is measured.
+    #[command(flatten)]
+    pub measure: MeasureArgs,
+}
+
+/// What can be done with measurements.
+#[derive(Subcommand, Debug)]
+pub enum Action {
+    /// What changed from one benchmark to another; exit code 1 if anything got worse.
+    Compare(CompareArgs),
+}
+
+/// Two benchmarks.
+#[derive(Args, Debug)]
+pub struct CompareArgs {
+    /// Directory of the benchmark before.
+    pub a: PathBuf,
+    /// Directory of the benchmark after.
+    pub b: PathBuf,
+    /// What is no regression yet: 0.1 is a tenth.
+    #[arg(long, value_name = "SHARE", default_value_t = THRESHOLD)]
+    pub threshold: f64,
+}
+
+/// What is measured.
+#[derive(Args, Debug)]
+pub struct MeasureArgs {
+    /// Height files of any supported format, directories of web-map tiles, `demo`.
+    #[arg(required_unless_present = "kit")]
+    pub terrain: Vec<String>,
+    /// How they are read.
+    #[command(flatten)]
+    pub reading: ReadArgs,
+    /// Directory for rows, results, pictures and the report; a run that was stopped goes on.
+    #[arg(long, value_name = "DIR", required = true)]
+    pub out: Option<PathBuf>,
+    /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
+    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    pub technique: Vec<String>,
+    /// A setting, for every technique that has it; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = super::scene::key_value)]
+    pub settings: Vec<(String, String)>,
+    /// Errors allowed, pixels.
+    #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
+    pub tolerance: Vec<f64>,
+    /// Paths to fly; the kit has its own.
+    #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = super::cases::path_help())]
+    pub path: Vec<String>,
+    /// What a pixel of error means.
+    #[arg(long, value_enum, default_value_t = Choice::Certified)]
+    pub metric: Choice,
+    /// Pixels; the kit has its own.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: [u32; 2],
+    /// Frames of a path; the kit has its own.
+    #[arg(long, value_name = "N", default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// How often each case is timed.
+    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: u32,
+    /// The public benchmark kit; terrains that are given join it.
+    #[arg(long)]
+    pub kit: bool,
+    /// A quarter of the frames and two rounds: to see that all works, not to quote.
+    #[arg(long)]
+    pub quick: bool,
+}
+
+#[derive(Serialize)]
+struct Done {
+    results: String,
+    report: String,
+    rows: usize,
+    complete: bool,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &BenchArgs) -> Result<Outcome> {
+    match &args.action {
+        Some(Action::Compare(compared)) => run_compare(common, compared),
+        None => measure(common, &args.measure),
+    }
+}
+
+fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
+    let share = args.threshold;
+    ensure!(share.is_finite() && share >= 0.0, "--threshold {share}: expected 0 or more");
+    let comparison = compare(&Results::read(&args.a)?, &Results::read(&args.b)?, share);
+    ensure!(comparison.matched > 0, "{}: has no case of {}", args.b.display(), args.a.display());
+    report::print(common, &comparison)?;
+    Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
+}
+
+/// Makes what draws. Every [`Scene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
+#[cfg(feature = "vulkan")]
+fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
+    bail!("bench: this build has no laboratory yet; `report` and `bench compare` work")
+}
+
+#[cfg(not(feature = "vulkan"))]
+fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
+    bail!("bench: built without Vulkan; `report` and `bench compare` work without it")
+}
+
+fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
+    let folder = args.out.as_deref().context("--out DIR is missing")?;
+    let mut laboratory = laboratory(common)?;
+    let planned = Planned::new(common, args)?;
+    let header = header(laboratory.as_mut(), &planned)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&stop);
+    // A second handler in one process is refused; then Ctrl-C ends the process, and the rows so far are kept.
+    let _ = ctrlc::set_handler(move || told.store(true, Ordering::Relaxed));
+    let run = Run {
+        folder,
+        cases: planned.cases,
+        fields: planned.fields,
+        rounds: planned.rounds,
+        warm_up: planned.warm_up,
+        stop: &stop,
+    };
+    let bar = progress(common);
+    let ended = run.run(laboratory.as_mut(), header, &mut |step| {
+        bar.set_length(step.done[1] as u64);
+        bar.set_position(step.done[0] as u64);
+        bar.set_message(step.case.to_string());
+    })?;
+    bar.finish_and_clear();
+    let page = crate::report::write(folder)?;
+    let rows = crate::bench::journal::read(folder)?.1.len();
+    let complete = ended == Ended::Complete;
+    if !complete {
+        report::warn(common, "stopped; the same command goes on where it was");
+    }
+    let (results, page) = (folder.join(RESULTS), page.display().to_string());
+    report::print(common, &Done { results: results.display().to_string(), report: page, rows, complete })?;
+    Ok(Outcome::Done)
+}
+
+fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {
+    let (device, plans) = laboratory.describe(&planned.fields)?;
+    Ok(Header {
+        schema: SCHEMA,
+        program: env!("CARGO_PKG_VERSION").to_string(),
+        commit: option_env!("CUESTA_COMMIT").map(str::to_string),
+        date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+        arguments: planned.arguments.clone(),
+        base: planned.base.clone(),
+        machine: Machine::this(),
+        device,
+        plans,
+    })
+}
+
+fn progress(common: &Common) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    if common.quiet {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} {eta} {wide_msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(500));
+    bar
+}

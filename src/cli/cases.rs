@@ -1,0 +1,221 @@
+//! What `cuesta bench` was asked for, turned into fields and cases.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Result, anyhow, bail, ensure};
+use clap::ValueEnum;
+
+use super::bench::MeasureArgs;
+use super::{Common, report};
+use crate::bench::{Case, Terrain, kit, paths};
+use crate::height::Field;
+use crate::lod::{self, Settings};
+
+/// Frames drawn before a path begins.
+const WARM_UP: usize = 5;
+/// About so many frames of a path are measured for errors.
+const MEASURED: usize = 12;
+/// The technique that draws every sample in every view, whatever the tolerance.
+const TRUTH: &str = "brute-force";
+
+/// Which metrics are measured.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// A true bound for every pixel.
+    Certified,
+    /// As published.
+    Paper,
+    /// One after the other.
+    Both,
+}
+
+/// What a run draws.
+pub struct Planned {
+    /// The fields of all cases.
+    pub fields: Vec<(Terrain, Arc<Field>)>,
+    /// The cases.
+    pub cases: Vec<Case>,
+    /// How often each is timed.
+    pub rounds: usize,
+    /// Frames drawn before a path begins.
+    pub warm_up: usize,
+    /// The technique that times are divided by.
+    pub base: String,
+    /// What makes two runs the same run, in words.
+    pub arguments: Vec<String>,
+}
+
+/// The paths, for `--help`.
+pub fn path_help() -> String {
+    let paths: Vec<_> = paths::PATHS.iter().map(|path| format!("{} ({})", path.name, path.about)).collect();
+    format!("Paths to fly; the kit has its own: {}", paths.join(", "))
+}
+
+/// One technique as it was asked for.
+struct Asked {
+    technique: String,
+    settings: BTreeMap<String, String>,
+}
+
+/// A path over a field.
+struct Flight {
+    terrain: Terrain,
+    path: &'static str,
+    size: [u32; 2],
+    frames: usize,
+    every: usize,
+}
+
+impl Planned {
+    /// Reads and makes the fields and lists the cases.
+    pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
+        let asked = techniques(args)?;
+        ensure!(args.tolerance.iter().all(|px| px.is_finite() && *px > 0.0), "--tolerance: expected positive pixels");
+        let (mut fields, mut flights) = (Vec::new(), Vec::new());
+        if args.kit {
+            of_kit(common, &mut fields, &mut flights);
+        }
+        of_files(common, args, &mut fields, &mut flights)?;
+        if args.quick {
+            flights.iter_mut().for_each(Flight::shorten);
+        }
+        let cases = flights.iter().flat_map(|flight| cases(flight, &asked, args)).collect();
+        let rounds = if args.quick { 2 } else { args.rounds as usize };
+        let warm_up = if args.kit && !args.quick { kit::WARM_UP } else { WARM_UP };
+        let arguments = arguments(args);
+        Ok(Self { fields, cases, rounds, warm_up, base: asked[0].technique.clone(), arguments })
+    }
+}
+
+/// The techniques asked for, checked; all of the table unless some are named.
+fn techniques(args: &MeasureArgs) -> Result<Vec<Asked>> {
+    let all: Vec<String> = lod::TECHNIQUES.iter().map(|entry| entry.name.to_string()).collect();
+    let names = if args.technique.is_empty() { &all } else { &args.technique };
+    for (key, _) in &args.settings {
+        let has = |name: &String| entry(name).is_ok_and(|(entry, _)| entry.settings.iter().any(|s| s.key == key));
+        ensure!(names.iter().any(has), "--set {key}: no technique of this run has this setting");
+    }
+    names.iter().map(|name| asked(name, &args.settings)).collect()
+}
+
+fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
+    let (technique, variant) = name.split_once(':').map_or((name, None), |(t, v)| (t, Some(v)));
+    let entry = lod::find(technique).ok_or_else(|| {
+        let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
+        anyhow!("--technique {technique}: expected one of {}", known.join(", "))
+    })?;
+    Ok((entry, variant))
+}
+
+fn asked(name: &str, choices: &[(String, String)]) -> Result<Asked> {
+    let (entry, variant) = entry(name)?;
+    let has = |key: &str| entry.settings.iter().any(|setting| setting.key == key);
+    let own: Vec<_> = choices.iter().filter(|(key, _)| has(key)).cloned().collect();
+    Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
+    Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
+}
+
+fn of_kit(common: &Common, fields: &mut Vec<(Terrain, Arc<Field>)>, flights: &mut Vec<Flight>) {
+    for scene in kit::SCENES {
+        let terrain = scene.terrain();
+        if fields.iter().all(|(other, _)| *other != terrain) {
+            let _spinner = report::spinner(common, format!("making {terrain}"));
+            fields.push((terrain.clone(), scene.field()));
+        }
+        let kit::KitScene { path, frames, every, .. } = *scene;
+        flights.push(Flight { terrain, path, size: kit::SIZE, frames, every });
+    }
+}
+
+fn of_files(
+    common: &Common,
+    args: &MeasureArgs,
+    fields: &mut Vec<(Terrain, Arc<Field>)>,
+    flights: &mut Vec<Flight>,
+) -> Result<()> {
+    let paths =
+        if args.kit { kit::REAL_PATHS.iter().map(|name| name.to_string()).collect() } else { args.path.clone() };
+    for file in &args.terrain {
+        let field = Arc::new(args.reading.load(common, file)?.field);
+        let name = Path::new(file).file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned());
+        let terrain = Terrain { name, size: field.size(), spacing_m: field.spacing };
+        if let Some((other, _)) =
+            fields.iter().find(|(other, _)| other.name == terrain.name && other.size == terrain.size)
+        {
+            bail!("{file}: there are two terrains {other}");
+        }
+        for name in &paths {
+            let Some(path) = paths::find(name) else {
+                let known: Vec<_> = paths::PATHS.iter().map(|path| path.name).collect();
+                bail!("--path {name}: expected one of {}", known.join(", "))
+            };
+            let frames = args.frames as usize;
+            let every = frames.div_ceil(MEASURED);
+            let size = if args.kit { kit::SIZE } else { args.size };
+            flights.push(Flight { terrain: terrain.clone(), path: path.name, size, frames, every });
+        }
+        fields.push((terrain, field));
+    }
+    Ok(())
+}
+
+impl Flight {
+    /// A quarter of the frames, of which a few are measured.
+    fn shorten(&mut self) {
+        self.frames = self.frames.div_ceil(4);
+        self.every = self.frames.div_ceil(3);
+    }
+}
+
+/// The cases of a flight; what draws every sample is there once.
+fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
+    let metrics: &[&str] = match args.metric {
+        Choice::Certified => &["certified"],
+        Choice::Paper => &["paper"],
+        Choice::Both => &["certified", "paper"],
+    };
+    let mut cases = Vec::new();
+    for (metric, asked) in metrics.iter().flat_map(|metric| asked.iter().map(move |asked| (metric, asked))) {
+        let is_truth = asked.technique == TRUTH;
+        let tolerances = if is_truth { &args.tolerance[..1] } else { &args.tolerance[..] };
+        if is_truth && *metric != metrics[0] {
+            continue;
+        }
+        cases.extend(tolerances.iter().map(|&tolerance_px| Case {
+            terrain: flight.terrain.clone(),
+            technique: asked.technique.clone(),
+            settings: asked.settings.clone(),
+            tolerance_px,
+            metric: metric.to_string(),
+            path: flight.path.to_string(),
+            size: flight.size,
+            frames: flight.frames,
+            every: flight.every,
+        }));
+    }
+    cases
+}
+
+/// The choices of a run, whatever order and form they were given in.
+fn arguments(args: &MeasureArgs) -> Vec<String> {
+    let joined = |values: &[String]| values.join(",");
+    let tolerances: Vec<_> = args.tolerance.iter().map(f64::to_string).collect();
+    let settings: Vec<_> = args.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
+    let mut list = args.terrain.clone();
+    let techniques = if args.technique.is_empty() { "all".to_string() } else { joined(&args.technique) };
+    let metric = format!("{:?}", args.metric).to_lowercase();
+    list.push(format!("--technique {techniques} --tolerance {} --metric {metric}", joined(&tolerances)));
+    if !settings.is_empty() {
+        list.push(format!("--set {}", joined(&settings)));
+    }
+    let [w, h] = args.size;
+    if args.kit {
+        list.push(format!("--kit (version {})", kit::VERSION));
+    } else {
+        list.push(format!("--path {} --size {w}x{h} --frames {}", joined(&args.path), args.frames));
+    }
+    list.push(if args.quick { "--quick".to_string() } else { format!("--rounds {}", args.rounds) });
+    list
+}

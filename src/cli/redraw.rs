@@ -1,0 +1,31 @@
+//! `cuesta report`: draws the report of a benchmark again, from its rows alone.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use serde::Serialize;
+
+use super::{Common, Outcome, report};
+use crate::bench::results;
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    /// Directory of a benchmark.
+    pub folder: PathBuf,
+}
+
+#[derive(Serialize)]
+struct Redrawn {
+    report: String,
+    results: String,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &ReportArgs) -> Result<Outcome> {
+    let results = results::write(&args.folder)?.display().to_string();
+    let report = crate::report::write(&args.folder)?.display().to_string();
+    report::print(common, &Redrawn { report, results })?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,7 @@
+//! The benchmark's driver, rows and comparison, with a laboratory that makes its numbers up.
+
+mod comparing;
+pub mod mock;
+mod paths;
+mod resuming;
+mod schema;

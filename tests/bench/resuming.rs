@@ -1,0 +1,124 @@
+//! What is killed goes on: every row once, whatever byte the file ends at.
+
+use std::fs;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cuesta::bench::journal::ROWS;
+use cuesta::bench::results::{RESULTS, Results, TABLE};
+use cuesta::bench::rows::Row;
+use cuesta::bench::run::{Ended, Run};
+use cuesta::bench::{Laboratory, journal};
+use rayon::prelude::*;
+
+use super::mock::{self, Mock};
+
+/// What tells a row from the others.
+fn keys(rows: &[Row]) -> Vec<String> {
+    let key = |row: &Row| match row {
+        Row::Header(_) => panic!("one header is enough"),
+        Row::Time(row) => format!("{} round {}", row.case, row.times.round),
+        Row::Error(row) => format!("{} errors", row.case),
+    };
+    rows.iter().map(key).collect()
+}
+
+#[test]
+fn killed_at_any_byte_a_run_goes_on_and_every_row_is_there_once() {
+    let fields = vec![mock::field(9)];
+    let cases = vec![
+        mock::case(&fields[0].0, "brute-force", 1.0, "certified", "spin"),
+        mock::case(&fields[0].0, "geomipmap", 1.0, "certified", "spin"),
+    ];
+    let whole = tempfile::tempdir().unwrap();
+    mock::run(whole.path(), fields.clone(), cases.clone(), 2);
+    let text = fs::read(whole.path().join(ROWS)).unwrap();
+    let expected = keys(&journal::read(whole.path()).unwrap().1);
+    assert_eq!(expected.len(), 6);
+    // What of the last line remains is the same torn line for most lengths; its first and last bytes are what differs.
+    (0..=text.len()).into_par_iter().for_each(|length| {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(ROWS), &text[..length]).unwrap();
+        let again = mock::run(folder.path(), fields.clone(), cases.clone(), 2);
+        let rows = journal::read(folder.path()).unwrap().1;
+        assert_eq!(keys(&rows), expected, "killed after {length} bytes");
+        let kept = text[..length].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1);
+        assert_eq!(again.calls.len(), 6 - kept, "{length}: what is there is not measured again");
+    });
+}
+
+#[test]
+fn a_stop_ends_after_the_row_at_hand_and_leaves_results() {
+    let fields = vec![mock::field(9)];
+    let cases = mock::cases(&fields, &["spin"]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut mock = Mock::default();
+    let header = mock::header(&mut mock, &fields);
+    let stop = AtomicBool::new(false);
+    let run = Run { folder: folder.path(), cases, fields, rounds: 2, warm_up: 3, stop: &stop };
+    let mut steps = 0;
+    let ended = run.run(&mut mock, header.clone(), &mut |step| {
+        steps += 1;
+        stop.store(step.done[0] == 4, Ordering::Relaxed);
+    });
+    assert_eq!((ended.unwrap(), steps, mock.calls.len()), (Ended::Stopped, 5, 5));
+    assert_eq!(Results::read(folder.path()).unwrap().cases.len(), 5);
+    for file in [RESULTS, TABLE] {
+        assert!(folder.path().join(file).is_file(), "{file}");
+    }
+    stop.store(false, Ordering::Relaxed);
+    let ended = run.run(&mut mock, header, &mut |_| {});
+    assert_eq!((ended.unwrap(), mock.calls.len()), (Ended::Complete, 33));
+}
+
+#[test]
+fn cases_of_a_scene_take_turns_and_the_warm_up_is_dropped() {
+    let fields = vec![mock::field(9)];
+    let cases = mock::cases(&fields, &["spin", "circle"]);
+    let folder = tempfile::tempdir().unwrap();
+    let calls = mock::run(folder.path(), fields, cases.clone(), 3).calls;
+    let (spin, circle) = cases.split_at(11);
+    let turn =
+        |cases: &[cuesta::bench::Case], what: &str| cases.iter().map(|c| format!("{what} {c}")).collect::<Vec<_>>();
+    let scene =
+        |cases| [turn(cases, "time"), turn(cases, "time"), turn(cases, "time"), turn(cases, "measure")].concat();
+    assert_eq!(calls, [scene(spin), scene(circle)].concat());
+    for case in Results::read(folder.path()).unwrap().cases {
+        let time = case.time.unwrap();
+        assert!(time.frame_max_ms < 1.5 * time.frame_ms.value, "the slow first frames do not count");
+        assert_eq!((time.hitches_percent, case.rounds.len()), (0.0, 3));
+        let base = time.over_base.unwrap();
+        assert_eq!(case.case.technique == "brute-force", (base.value - 1.0).abs() < 1e-12, "{base:?}");
+    }
+}
+
+#[test]
+fn rows_of_another_run_are_refused_in_one_line() {
+    let fields = vec![mock::field(9)];
+    let cases = vec![mock::case(&fields[0].0, "geomipmap", 1.0, "certified", "spin")];
+    let folder = tempfile::tempdir().unwrap();
+    mock::run(folder.path(), fields.clone(), cases.clone(), 1);
+    let mut mock = Mock::default();
+    let same = mock::header(&mut mock, &fields);
+    let stop = AtomicBool::new(false);
+    let run = Run { folder: folder.path(), cases, fields, rounds: 1, warm_up: 3, stop: &stop };
+    let mut refused = |change: &dyn Fn(&mut cuesta::bench::Header), word: &str| {
+        let mut header = same.clone();
+        change(&mut header);
+        let error = format!("{:#}", run.run(&mut mock as &mut dyn Laboratory, header, &mut |_| {}).unwrap_err());
+        assert!(error.contains(word) && error.contains(ROWS) && error.lines().count() == 1, "{error}");
+    };
+    refused(&|h| h.arguments.push("--frames 7".to_string()), "arguments");
+    refused(&|h| h.device.driver = "other".to_string(), "device");
+    refused(&|h| h.commit = None, "commit");
+    refused(&|h| h.machine.cores = 64, "machine");
+    let mut header = same.clone();
+    header.date = "later".to_string();
+    assert_eq!(run.run(&mut mock, header, &mut |_| {}).unwrap(), Ended::Complete);
+    assert_eq!(mock.calls.len(), 0, "nothing was measured twice");
+
+    let path = folder.path().join(ROWS);
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("\"round\"", "\"rund\"", 1)).unwrap();
+    let error = format!("{:#}", journal::read(folder.path()).unwrap_err());
+    assert!(error.contains("rows.jsonl: line 2"), "{error}");
+}

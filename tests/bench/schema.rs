@@ -1,0 +1,99 @@
+//! Results and rows against the documented JSON Schema, which allows no field that it does not name.
+
+use std::path::Path;
+
+use boon::{Compiler, SchemaIndex, Schemas};
+use cuesta::bench::journal::ROWS;
+use cuesta::bench::results::{self, RESULTS, Results, TABLE};
+use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary};
+use serde_json::Value;
+
+use super::mock;
+
+/// The schema in the document, of results and of rows.
+fn schemas() -> (Schemas, [SchemaIndex; 2]) {
+    let text = include_str!("../../docs/results-schema.md");
+    let json = text.split("```json").nth(1).and_then(|rest| rest.split("```").next()).expect("a JSON Schema");
+    let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
+    compiler.add_resource("results.json", serde_json::from_str(json).expect("JSON")).expect("a schema");
+    let places = ["results.json", "results.json#/$defs/row"];
+    let compiled = places.map(|at| compiler.compile(at, &mut schemas).expect("a valid schema"));
+    (schemas, compiled)
+}
+
+fn benchmark(folder: &Path) -> Results {
+    let fields = vec![mock::field(33), mock::field(65)];
+    let cases = mock::cases(&fields, &["circle"]);
+    mock::run(folder, fields, cases, 2);
+    Results::read(folder).unwrap()
+}
+
+fn text(folder: &Path, file: &str) -> String {
+    std::fs::read_to_string(folder.join(file)).unwrap()
+}
+
+#[test]
+fn results_and_rows_are_as_documented() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = benchmark(folder.path());
+    let (schemas, [whole, row]) = schemas();
+    let value: Value = serde_json::from_str(&text(folder.path(), RESULTS)).unwrap();
+    schemas.validate(&value, whole).unwrap_or_else(|error| panic!("{error:#}"));
+    assert_eq!(serde_json::from_value::<Results>(value).unwrap(), results, "what is written is read");
+    for line in text(folder.path(), ROWS).lines() {
+        let value = serde_json::from_str(line).unwrap();
+        schemas.validate(&value, row).unwrap_or_else(|error| panic!("{error:#}"));
+    }
+    let infinite = Errors { error_px: Summary { rms: 1.0, p999: 2.0, max: f64::INFINITY }, ..Errors::default() };
+    let unbounded = Row::Error(ErrorRow { case: results.cases[0].case.clone(), errors: infinite });
+    schemas.validate(&serde_json::to_value(unbounded).unwrap(), row).unwrap_or_else(|error| panic!("{error:#}"));
+}
+
+/// A schema that nothing fails proves nothing.
+#[test]
+fn what_is_not_as_documented_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    benchmark(folder.path());
+    let (schemas, [whole, _]) = schemas();
+    let value: Value = serde_json::from_str(&text(folder.path(), RESULTS)).unwrap();
+    let changes: [fn(&mut Value); 6] = [
+        |v| v["schema"] = 2.into(),
+        |v| v["cases"][0]["case"]["metric"] = "other".into(),
+        |v| v["cases"][0]["rounds"][0]["hitches"] = (-1).into(),
+        |v| v["cases"][0]["rounds"][0]["frame_ms"]["p50"] = Value::Null,
+        |v| v["cases"][0]["errors"]["unheard_of"] = 1.into(),
+        |v| v["header"]["machine"].as_object_mut().unwrap().clear(),
+    ];
+    for (k, change) in changes.iter().enumerate() {
+        let mut changed = value.clone();
+        change(&mut changed);
+        assert!(schemas.validate(&changed, whole).is_err(), "change {k}");
+    }
+}
+
+#[test]
+fn the_table_has_a_line_a_case_with_what_the_results_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = benchmark(folder.path());
+    let mut reader = csv::Reader::from_path(folder.path().join(TABLE)).unwrap();
+    let columns: Vec<String> = reader.headers().unwrap().iter().map(str::to_string).collect();
+    let records: Vec<_> = reader.records().map(|record| record.unwrap()).collect();
+    assert_eq!(records.len(), results.cases.len());
+    for (record, result) in records.iter().zip(&results.cases) {
+        let cell = |name: &str| &record[columns.iter().position(|c| c == name).unwrap_or_else(|| panic!("{name}"))];
+        assert_eq!(cell("case.technique"), result.case.technique);
+        assert_eq!(cell("case.terrain.size.1"), result.case.terrain.size[1].to_string());
+        assert_eq!(cell("time.frame_ms.value").parse(), Ok(result.time.as_ref().unwrap().frame_ms.value));
+        assert_eq!(cell("errors.error_px.max").parse(), Ok(result.errors.as_ref().unwrap().error_px.max));
+        assert_eq!(cell("errors.image.psnr"), "infinite");
+    }
+}
+
+#[test]
+fn written_again_from_the_rows_the_results_are_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    benchmark(folder.path());
+    let before = [RESULTS, TABLE].map(|file| text(folder.path(), file));
+    results::write(folder.path()).unwrap();
+    assert_eq!([RESULTS, TABLE].map(|file| text(folder.path(), file)), before);
+}
