@@ -61,7 +61,8 @@ impl DeviceLaboratory {
             self.truths = (name, BTreeMap::new());
         }
         if !self.truths.1.contains_key(&frame) {
-            let plan = ScenePlan::new(scene.field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+            let plan =
+                ScenePlan::new(scene.field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
             let truth = Truth::new(&self.scene(scene.field, &plan), &scene.views[frame])?;
             self.truths.1.insert(frame, truth);
         }
@@ -140,6 +141,10 @@ impl Laboratory for DeviceLaboratory {
             before = is_wanted.then(|| (technique.resident().clone(), stage.list.clone()));
         }
         pool.finish(scene)
+    }
+
+    fn close(self: Box<Self>) -> Vec<String> {
+        Gpu::close(self.gpu)
     }
 }
 

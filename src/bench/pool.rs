@@ -36,7 +36,7 @@ pub struct Pool {
     as_drawn: Option<bool>,
     hole_pixels: u64,
     pops: Option<(Histogram, f64, f64)>,
-    triangles: u64,
+    in_view: u64,
     sub_pixel: f64,
     shown: u64,
     sizes: Option<Histogram>,
@@ -118,7 +118,7 @@ impl Pool {
 
     /// What a frame's triangles were spent on; fragments run, and pixels covered by land.
     pub fn economy(&mut self, economy: &economy::Economy, fragments: Option<u64>, covered: u64) {
-        self.triangles += economy.triangles;
+        self.in_view += economy.shown + economy.facing_away;
         self.shown += economy.shown;
         self.sub_pixel += economy.sub_pixel_share * economy.shown as f64;
         match &mut self.sizes {
@@ -233,7 +233,7 @@ impl Pool {
         let rtin = reference::rtin(scene.field, error_m)?.triangles;
         // Of the mesh, the part that lies in view.
         let in_view = self.samples[0] / (self.frames as f64 * (columns * rows) as f64);
-        let drawn = self.triangles as f64 / self.frames as f64;
+        let drawn = self.in_view as f64 / self.frames as f64;
         let multiple = (in_view > 0.0).then(|| drawn / (delaunay as f64 * in_view));
         Ok(Some(Reference { error_m, delaunay: Some(delaunay), rtin: Some(rtin), multiple }))
     }
@@ -247,7 +247,8 @@ fn bins(histogram: &Histogram) -> Vec<Bin> {
 
 /// Writes a picture of a case; its name relative to the folder.
 fn save_picture(scene: &Scene, what: &str, picture: &RgbImage) -> Result<String> {
-    let mut name: String = format!("{}-{what}", scene.case).chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    let mut name: String =
+        format!("{}-{what}", scene.case).chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
     while name.contains("--") {
         name = name.replace("--", "-");
     }

@@ -77,6 +77,11 @@ pub trait Laboratory {
 
     /// Draws every view once, in order, and measures the frames 0, [`Case::every`], 2 · [`Case::every`], …
     fn measure(&mut self, scene: &Scene) -> Result<Errors>;
+
+    /// Ends it: what the validation layers have said, if they were asked.
+    fn close(self: Box<Self>) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// What is to be run.

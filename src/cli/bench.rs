@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -100,6 +100,7 @@ struct Done {
     report: String,
     rows: usize,
     complete: bool,
+    validation_messages: Vec<String>,
 }
 
 /// Runs the subcommand.
@@ -121,13 +122,14 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
 
 /// Makes what draws. Every [`Scene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
 #[cfg(feature = "vulkan")]
-fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
-    bail!("bench: this build has no laboratory yet; `report` and `bench compare` work")
+fn laboratory(common: &Common) -> Result<Box<dyn Laboratory>> {
+    let gpu = super::render::open(common, false)?;
+    Ok(Box::new(crate::bench::device::DeviceLaboratory::new(gpu, crate::plan::Look::default())))
 }
 
 #[cfg(not(feature = "vulkan"))]
 fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
-    bail!("bench: built without Vulkan; `report` and `bench compare` work without it")
+    anyhow::bail!("bench: built without Vulkan; `report` and `bench compare` work without it")
 }
 
 fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
@@ -160,9 +162,11 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     if !complete {
         report::warn(common, "stopped; the same command goes on where it was");
     }
-    let (results, page) = (folder.join(RESULTS), page.display().to_string());
-    report::print(common, &Done { results: results.display().to_string(), report: page, rows, complete })?;
-    Ok(Outcome::Done)
+    let (results, page) = (folder.join(RESULTS).display().to_string(), page.display().to_string());
+    let messages = laboratory.close();
+    let is_valid = messages.is_empty();
+    report::print(common, &Done { results, report: page, rows, complete, validation_messages: messages })?;
+    Ok(if is_valid { Outcome::Done } else { Outcome::LimitMissed })
 }
 
 fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {
