@@ -2,6 +2,7 @@
 
 mod faults;
 mod journeys;
+mod peers;
 mod rays;
 
 use std::sync::Arc;

@@ -7,7 +7,7 @@
 //!   M. Garland and P. S. Heckbert, "Fast Polygonal Approximation of Terrains and Height Fields" (1995), §4.5;
 //! - *RTIN*: the coarsest conforming mesh of the right-triangle hierarchy of W. Evans, D. Kirkpatrick and
 //!   G. Townsend, "Right-Triangulated Irregular Networks" (2001), here not by an estimate of errors but by the
-//!   errors themselves, see [`rtin`]: what any technique on that hierarchy could do at best.
+//!   errors themselves, see [`mod@rtin`]: what any technique on that hierarchy could do at best.
 //!
 //! Both mesh the whole rectangle: a hole counts as the land that fills it. The greedy mesh of more than
 //! [`TILE`] cells along a side is made in tiles that size or a little smaller, each by itself: its count is then
