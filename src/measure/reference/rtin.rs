@@ -209,13 +209,19 @@ mod tests {
     fn the_field_need_not_fill_the_square() {
         let field = spike(20, [19, 18]);
         let mesh = Rtin::refined(&field, 1.0);
-        let (mut inside, mut count) = (0, 0);
-        mesh.visit(|t| {
-            count += 1;
-            inside += usize::from(t.iter().all(|&[x, z]| x <= 19 && z <= 19));
+        let (mut found, mut all) = (Vec::new(), Vec::new());
+        mesh.visit(|triangle| found.push(triangle));
+        Rtin { last: [32, 32], split: mesh.split.clone(), ..mesh }.visit(|triangle| all.push(triangle));
+        // Points inside the quarters of the field's cells, in quarters of a sample.
+        let points = (0..19 * 19)
+            .flat_map(|k| [[1, 2], [2, 1], [3, 2], [2, 3]].map(|[x, z]| [4 * (k % 19) + x, 4 * (k / 19) + z]));
+        let points: Vec<_> = points.map(|[x, z]| Corner { x, z, y: 0.0 }).collect();
+        all.retain(|t| {
+            let [a, b, c] = facing_up(&t.map(|[x, z]| Corner { x: 4 * x, z: 4 * z, y: 0.0 }));
+            points.iter().any(|&p| [[a, b, p], [b, c, p], [c, a, p]].iter().all(|side| doubled_area(side) > 0))
         });
-        assert_eq!(mesh.side, 32);
-        assert!(count > inside && inside > count / 2, "{inside} of {count} triangles wholly on the field");
+        assert_eq!(found, all);
+        assert!(found.iter().flatten().flatten().any(|&n| n > 19), "some triangles stick out");
         assert!(coarsest(&field, 1.0).1 <= 1.0);
     }
 }
