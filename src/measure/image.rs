@@ -1,7 +1,7 @@
 //! How far a picture is from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
 //!
 //! - SSIM: Z. Wang, A. Bovik, H. Sheikh and E. Simoncelli, "Image Quality Assessment: From Error Visibility to
-//!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of §III.B, on luma
+//!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of §III.C, on luma
 //!   (Rec. 601, not rounded), averaged over the windows that lie wholly in the picture;
 //! - FLIP: P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020), by its authors'
 //!   own program, at [`PIXELS_PER_DEGREE`].
@@ -182,8 +182,10 @@ mod tests {
         let c1 = 2.55f64 * 2.55;
         let expected = (2.0 * 100.0 * 140.0 + c1) / (100.0 * 100.0 + 140.0 * 140.0 + c1);
         assert!((compare(&a, &b).unwrap().0.ssim.unwrap() - expected).abs() < 1e-9);
-        let small = picture([10, 40], |_, _| [0; 3]);
-        assert_eq!(compare(&small, &small).unwrap().0.ssim, None);
+        for size in [[10, 40], [40, 10], [1, 1]] {
+            let small = picture(size, |_, _| [0; 3]);
+            assert_eq!(compare(&small, &small).unwrap().0.ssim, None);
+        }
     }
 
     /// The window of the paper, over the definition of variance instead of means of squares.
@@ -229,7 +231,7 @@ mod tests {
 
     fn flip_of_colours(a: [u8; 3], b: [u8; 3]) -> f64 {
         let distance = |a, b| hyab(hunt_adjusted(a), hunt_adjusted(b)).powf(0.7);
-        // §4.1: the largest distance is that of green and blue; up to 0.4 of it takes 0.95 of the range.
+        // The colour pipeline's end: the largest distance is that of green and blue; up to 0.4 of it takes 0.95 of the range.
         let (largest, found) = (distance([0, 255, 0], [0, 0, 255]), distance(a, b));
         let knee = 0.4 * largest;
         if found < knee { found / knee * 0.95 } else { 0.95 + (found - knee) / (largest - knee) * 0.05 }

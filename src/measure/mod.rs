@@ -9,6 +9,7 @@ pub mod image;
 pub mod peers;
 pub mod picture;
 pub mod pop;
+mod projection;
 pub mod reference;
 pub mod summary;
 pub mod watertight;

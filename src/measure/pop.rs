@@ -10,10 +10,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::geometric::{owns, pinhole};
+use super::geometric::owns;
 use super::histogram::Histogram;
+use super::projection::Projection;
 use super::summary::{Place, Tally, infinite_if_null};
-use super::{each_part, facing_up, in_view};
+use super::{each_part, facing_up};
 use crate::draw::layout::Frame;
 use crate::draw::{Draw, DrawList, Geometry, expand};
 use crate::height::Field;
@@ -53,7 +54,7 @@ pub struct Pop {
 /// Measures the jump from the level of detail of frame t − 1 to that of frame t in the view of frame t. Takes
 /// eight bytes a sample of the field while it runs.
 pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
-    let meter = Meter { field, view, pinhole: pinhole(view), frame: Frame::placing(field, view) };
+    let meter = Meter { field, projection: Projection::new(view), frame: Frame::placing(field, view) };
     let heights = meter.heights(before);
     let (mut tally, mut histogram) = meter.empty();
     let work = |part: &Draw| meter.part(&heights, after, part);
@@ -72,8 +73,7 @@ pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
 
 struct Meter<'a> {
     field: &'a Field,
-    view: &'a View,
-    pinhole: View,
+    projection: Projection,
     frame: Frame,
 }
 
@@ -115,8 +115,10 @@ impl Meter<'_> {
         self.samples(after, part, |x, z, y| {
             let old = f64::from_bits(before[self.index(x, z)].load(Ordering::Relaxed));
             let [from, to] = [old, y].map(|y| self.field.world_at(x.into(), z.into(), y));
-            if !old.is_nan() && in_view(self.view, to) {
-                let moved_px = self.pinhole.displacement_px(to, from);
+            if !old.is_nan()
+                && let Some(at) = self.projection.project_seen(to)
+            {
+                let moved_px = self.projection.distance_px(&at, from);
                 tally.add(moved_px, true, Place { sample: [x, z], truth: from, drawn: to });
                 histogram.add(moved_px);
             }

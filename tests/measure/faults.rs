@@ -28,7 +28,7 @@ fn scene() -> Scene {
         lens: Lens::Perspective { fov_x: 1.2 },
         size: [1280, 720],
         near: 1.0,
-        tolerance: Tolerance { px: 4.0, metric: Metric::Certified },
+        tolerance: Tolerance { px: 20.0, metric: Metric::Certified },
     };
     let mut technique = technique(&field, "geomipmap", &[("block", "17")]);
     let list = select(&mut *technique, &view);
@@ -57,10 +57,6 @@ impl Scene {
         let marked = picture.pixels().filter(|p| p.0[0].abs_diff(p.0[2]) > 60).count();
         let share = marked as f64 / picture.pixels().len() as f64;
         assert!((0.01..0.5).contains(&share), "{kind:?}: {share} of the picture is marked");
-        if let Some(folder) = std::env::var_os("SHOW_FAULTS") {
-            let path = std::path::Path::new(&folder).join(format!("{kind:?}-{}-{}.png", at[0], at[1]));
-            picture.save(path).expect("a folder to write to");
-        }
     }
 
     /// The triangle nearest the middle of the picture that has a property.

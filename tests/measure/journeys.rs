@@ -60,7 +60,7 @@ fn view((eye, target): (DVec3, DVec3)) -> View {
         eye,
         world_from_eye: View::looking_along(target - eye),
         lens: Lens::Perspective { fov_x: 70f64.to_radians() },
-        size: [1280, 720],
+        size: [640, 360],
         near: 0.5,
         tolerance: Tolerance { px: 3.0, metric: Metric::Certified },
     }

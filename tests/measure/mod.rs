@@ -1,7 +1,10 @@
 //! Measurements on lists of real techniques.
 
+mod angles;
 mod faults;
 mod journeys;
+mod peers;
+mod pops;
 mod rays;
 
 use std::sync::Arc;

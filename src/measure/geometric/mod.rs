@@ -16,15 +16,16 @@ mod silhouette;
 use serde::{Deserialize, Serialize};
 
 use self::silhouette::Silhouette;
+use super::projection::Projection;
 use super::summary::Tally;
 pub use super::summary::{Place, Summary};
-use super::{each_part, facing_up, in_view};
+use super::{each_part, facing_up};
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
 use crate::draw::{Draw, DrawList, Geometry};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle, doubled_area};
-use crate::view::{Aabb, Containment, Frustum, Lens, View};
+use crate::view::{Aabb, Containment, Frustum, Projected, View};
 use glam::DVec3;
 
 /// Bins of the angle off the view axis, 10° each: a perspective picture ends before 90°.
@@ -96,25 +97,24 @@ impl Tallies {
 /// What triangles are measured with.
 struct Ruler<'a> {
     field: &'a Field,
-    view: &'a View,
+    tolerance_px: f64,
     frame: Frame,
     frustum: Frustum,
+    projection: Projection,
     silhouette: Silhouette<'a>,
-    /// The view with its near plane moved to the eye: see the module's text.
-    pinhole: View,
     /// Squared cosines of the angles where bins meet.
     bin_ends: [f64; ANGLES - 1],
 }
 
 impl<'a> Ruler<'a> {
-    fn new(field: &'a Field, view: &'a View) -> Self {
+    fn new(field: &'a Field, view: &View) -> Self {
         Self {
             field,
-            view,
+            tolerance_px: view.tolerance.px,
             frame: Frame::placing(field, view),
             frustum: view.frustum(),
+            projection: Projection::new(view),
             silhouette: Silhouette::new(field, view),
-            pinhole: pinhole(view),
             bin_ends: std::array::from_fn(|k| (10.0 * (k + 1) as f64).to_radians().cos().powi(2)),
         }
     }
@@ -151,47 +151,31 @@ impl<'a> Ruler<'a> {
                 return;
             }
             let drawn = self.field.world_at(f64::from(x), f64::from(z), y);
-            if in_view(self.view, drawn) {
-                self.sample(Place { sample: [x, z], truth: self.field.world(x, z), drawn }, counts, tallies);
+            if let Some(at) = self.projection.project_seen(drawn) {
+                self.sample(Place { sample: [x, z], truth: self.field.world(x, z), drawn }, &at, counts, tallies);
             }
         });
     }
 
-    fn sample(&self, place: Place, counts: bool, tallies: &mut Tallies) {
-        let error_px = self.pinhole.displacement_px(place.drawn, place.truth);
+    fn sample(&self, place: Place, at: &Projected, counts: bool, tallies: &mut Tallies) {
+        let error_px = self.projection.distance_px(at, place.truth);
         tallies.vertical.add((place.drawn.y - place.truth.y).abs(), counts, place);
         tallies.screen.add(error_px, counts, place);
-        tallies.off_axis[self.angle_bin(place.drawn)].add(error_px, counts, place);
-        tallies.beyond += u64::from(counts && error_px > self.view.tolerance.px);
-        if self.silhouette.passes(place.sample) {
+        tallies.off_axis[self.angle_bin(place.drawn, at)].add(error_px, counts, place);
+        tallies.beyond += u64::from(counts && error_px > self.tolerance_px);
+        if self.silhouette.passes(&place) {
             tallies.silhouette.add(error_px, counts, place);
         }
     }
 
-    /// The bin of a point in view.
-    fn angle_bin(&self, point: DVec3) -> usize {
-        if matches!(self.view.lens, Lens::Orthographic { .. }) {
-            return 0;
-        }
-        let away = point - self.view.eye;
-        let along = away.dot(self.view.forward());
-        let squared_cosine = along * along / away.length_squared();
+    fn angle_bin(&self, point: DVec3, at: &Projected) -> usize {
+        let squared_cosine = self.projection.squared_cosine(point, at);
         self.bin_ends.iter().filter(|&&end| squared_cosine <= end).count()
     }
 }
 
-/// The view with its near plane moved to the eye.
-pub(super) fn pinhole(view: &View) -> View {
-    let near = match view.lens {
-        // Not zero: a depth that it divides by must leave finite pixels.
-        Lens::Perspective { .. } => 1e-100,
-        Lens::Orthographic { .. } => f64::NEG_INFINITY,
-    };
-    View { near, ..*view }
-}
-
 /// The box around a triangle, world metres.
-pub(super) fn bounds(field: &Field, triangle: &Triangle) -> Aabb {
+fn bounds(field: &Field, triangle: &Triangle) -> Aabb {
     let [a, b, c] = triangle.map(|corner| field.world_at(corner.x.into(), corner.z.into(), corner.y.into()));
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
 }

@@ -3,7 +3,8 @@
 use super::*;
 use crate::draw::{ExplicitVertex, Instance, Source, Topology};
 use crate::height::{Holes, Samples};
-use crate::view::{Metric, Tolerance};
+use crate::measure::in_view;
+use crate::view::{Lens, Metric, Tolerance, View};
 
 /// Two triangles over a field of bumps, as a streamed list.
 fn slab([w, h]: [u32; 2]) -> (Field, DrawList) {

@@ -3,11 +3,11 @@
 //! Two meshes of the whole field, refined until their true largest error, measured over every sample by
 //! [`surface::deviation`], is within what was asked:
 //!
-//! - *greedy*: the Delaunay triangulation to which the worst sample is added again and again, after
-//!   M. Garland and P. S. Heckbert, "Fast Polygonal Approximation of Terrains and Height Fields" (1995), §4.5;
+//! - *greedy*: the Delaunay triangulation to which the worst sample is added again and again, the greedy insertion
+//!   of M. Garland and P. S. Heckbert, "Fast Polygonal Approximation of Terrains and Height Fields" (1995);
 //! - *RTIN*: the coarsest conforming mesh of the right-triangle hierarchy of W. Evans, D. Kirkpatrick and
 //!   G. Townsend, "Right-Triangulated Irregular Networks" (2001), here not by an estimate of errors but by the
-//!   errors themselves, see [`rtin`]: what any technique on that hierarchy could do at best.
+//!   errors themselves (`reference/rtin.rs`): what any technique on that hierarchy could do at best.
 //!
 //! Both mesh the whole rectangle: a hole counts as the land that fills it. The greedy mesh of more than
 //! [`TILE`] cells along a side is made in tiles that size or a little smaller, each by itself: its count is then

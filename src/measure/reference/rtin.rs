@@ -16,12 +16,13 @@ use crate::measure::facing_up;
 
 /// Triangles of the mesh, and its largest error, metres. The field has no holes.
 pub fn coarsest(field: &Field, tolerance_m: f64) -> (u64, f64) {
-    let cells = field.size().map(|n| n - 1);
-    let side = cells[0].max(cells[1]).next_power_of_two() as i32;
-    let words = (side as usize + 1).pow(2).div_ceil(64);
-    let mut mesh = Rtin { field, side, last: cells.map(|n| n as i32), tolerance_m, split: vec![0; words] };
-    mesh.refine();
-    mesh.measure()
+    let mesh = Rtin::refined(field, tolerance_m);
+    let (mut count, mut largest) = (0, 0.0f64);
+    mesh.visit(|triangle| {
+        count += 1;
+        largest = largest.max(mesh.error(triangle));
+    });
+    (count, largest)
 }
 
 struct Rtin<'a> {
@@ -34,23 +35,28 @@ struct Rtin<'a> {
     split: Vec<u64>,
 }
 
-impl Rtin<'_> {
-    /// Splits until every triangle is within the error.
-    fn refine(&mut self) {
+impl<'a> Rtin<'a> {
+    /// Split until every triangle is within the error.
+    fn refined(field: &'a Field, tolerance_m: f64) -> Self {
+        let cells = field.size().map(|n| n - 1);
+        let side = cells[0].max(cells[1]).next_power_of_two() as i32;
+        let words = (side as usize + 1).pow(2).div_ceil(64);
+        let mut mesh = Rtin { field, side, last: cells.map(|n| n as i32), tolerance_m, split: vec![0; words] };
         let mut waiting = Vec::new();
-        for triangle in roots(self.side) {
-            self.demand(triangle, &mut waiting);
-        }
+        roots(side).into_iter().for_each(|triangle| mesh.demand(triangle, &mut waiting));
         while let Some(at) = waiting.pop() {
-            if !self.mark(at) {
-                continue;
-            }
-            let (before, after) = around(at, self.side);
-            waiting.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
-            for k in 0..4 {
-                self.demand([at, after[k], after[(k + 1) % 4]], &mut waiting);
+            if mesh.mark(at) {
+                mesh.follow(at, &mut waiting);
             }
         }
+        mesh
+    }
+
+    /// Asks for the splits that one at a position needs, before it and after it.
+    fn follow(&self, at: [i32; 2], waiting: &mut Vec<[i32; 2]>) {
+        let (before, after) = around(at, self.side);
+        waiting.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
+        (0..4).for_each(|k| self.demand([at, after[k], after[(k + 1) % 4]], waiting));
     }
 
     /// Asks for the split of a triangle [apex, base, base] if it is beyond the error.
@@ -63,22 +69,17 @@ impl Rtin<'_> {
         }
     }
 
-    /// Counts what is not split, and measures it.
-    fn measure(&self) -> (u64, f64) {
-        let (mut count, mut largest) = (0, 0.0f64);
+    /// Triangles on the field that are not split, [apex, base, base].
+    fn visit(&self, mut visit: impl FnMut([[i32; 2]; 3])) {
         let mut open = roots(self.side).to_vec();
         while let Some(triangle) = open.pop() {
             let [apex, a, b] = triangle;
             match midpoint(triangle).filter(|&at| self.is_split(at)) {
                 Some(at) => open.extend([[at, apex, a], [at, b, apex]]),
-                None if self.meets_field(triangle) => {
-                    count += 1;
-                    largest = largest.max(self.error(triangle));
-                }
+                None if self.meets_field(triangle) => visit(triangle),
                 None => {}
             }
         }
-        (count, largest)
     }
 
     /// The largest distance of a triangle from the field's samples in it, metres.
@@ -164,5 +165,63 @@ fn around([x, z]: [i32; 2], side: i32) -> ([[i32; 2]; 2], [[i32; 2]; 4]) {
         // On a side along x.
         [1, _] => ([straight[1], straight[3]], straight),
         _ => ([straight[0], straight[2]], straight),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::expand::Drawn;
+    use crate::height::{Holes, Samples};
+    use crate::measure::watertight;
+    use crate::view::{Lens, Metric, Tolerance, View};
+    use glam::DVec3;
+
+    /// Land with one spike: what is split there needs splits all around.
+    fn spike(side: u32, at: [u32; 2]) -> Field {
+        let height = |k: u32| if [k % side, k / side] == at { 10.0 } else { 0.0 };
+        let heights = (0..side * side).map(height).collect();
+        Field::new(Samples::F32(heights), [side; 2], [1.0, 1.0], Holes::none((side * side) as usize))
+    }
+
+    #[test]
+    fn a_mesh_is_one_surface() {
+        let view = View {
+            eye: DVec3::new(16.0, 100.0, 16.0),
+            world_from_eye: View::turned(-90.0, -90.0, 0.0),
+            lens: Lens::Orthographic { width: 100.0, far: 1e3 },
+            size: [100, 100],
+            near: 1.0,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        };
+        for at in [[1, 1], [16, 16], [7, 20], [32, 5], [11, 12], [0, 31]] {
+            let field = spike(33, at);
+            let mesh = Rtin::refined(&field, 1.0);
+            let mut triangles = Vec::new();
+            mesh.visit(|t| triangles.push(Drawn { corners: facing_up(&t.map(|p| mesh.corner(p))), instance: 0 }));
+            let proof = watertight::prove(&field, &view.frustum(), &triangles).unwrap();
+            assert_eq!(proof.doubled_area, 2 * 32 * 32);
+            assert!((10..200).contains(&proof.triangles), "{at:?}: {} triangles", proof.triangles);
+        }
+    }
+
+    #[test]
+    fn the_field_need_not_fill_the_square() {
+        let field = spike(20, [19, 18]);
+        let mesh = Rtin::refined(&field, 1.0);
+        let (mut found, mut all) = (Vec::new(), Vec::new());
+        mesh.visit(|triangle| found.push(triangle));
+        Rtin { last: [32, 32], split: mesh.split.clone(), ..mesh }.visit(|triangle| all.push(triangle));
+        // Points inside the quarters of the field's cells, in quarters of a sample.
+        let points = (0..19 * 19)
+            .flat_map(|k| [[1, 2], [2, 1], [3, 2], [2, 3]].map(|[x, z]| [4 * (k % 19) + x, 4 * (k / 19) + z]));
+        let points: Vec<_> = points.map(|[x, z]| Corner { x, z, y: 0.0 }).collect();
+        all.retain(|t| {
+            let [a, b, c] = facing_up(&t.map(|[x, z]| Corner { x: 4 * x, z: 4 * z, y: 0.0 }));
+            points.iter().any(|&p| [[a, b, p], [b, c, p], [c, a, p]].iter().all(|side| doubled_area(side) > 0))
+        });
+        assert_eq!(found, all);
+        assert!(found.iter().flatten().flatten().any(|&n| n > 19), "some triangles stick out");
+        assert!(coarsest(&field, 1.0).1 <= 1.0);
     }
 }
