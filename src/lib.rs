@@ -11,6 +11,7 @@
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
+//! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
 
@@ -31,6 +32,8 @@ pub mod measure;
 
 #[cfg(feature = "vulkan")]
 pub mod scene;
+
+pub mod profile;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;

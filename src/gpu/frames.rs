@@ -17,6 +17,8 @@ const SCOPES: u32 = 16;
 pub struct Timing {
     /// Name and milliseconds of each pass, in order.
     pub passes: Vec<(&'static str, f64)>,
+    /// Device ticks at the start and the end of each pass.
+    pub ticks: Vec<[u64; 2]>,
     /// Milliseconds from the first pass's start to the last one's end.
     pub total_ms: f64,
     /// Vertices run, primitives after clipping, fragments run — of the pass named `terrain`.
@@ -130,11 +132,25 @@ impl Frames {
 impl Recording<'_> {
     /// Records a pass under one name: debug label, timestamps, and, for `terrain`, pipeline statistics.
     pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        self.timed_scope(name, name == "terrain", record)
+    }
+
+    /// As [`Self::scope`] without statistics: what is recorded may take its own.
+    pub fn uncounted_scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        self.timed_scope(name, false, record)
+    }
+
+    fn timed_scope<T>(
+        &mut self,
+        name: &'static str,
+        counts: bool,
+        record: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
         let commands = self.commands;
         self.gpu.begin_label(commands, name);
         let timed = self.measured && (self.state.scopes.len() as u32) < SCOPES;
         let first = 2 * self.state.scopes.len() as u32;
-        let counted = timed && name == "terrain" && self.state.statistics != vk::QueryPool::null();
+        let counted = timed && counts && self.state.statistics != vk::QueryPool::null();
         // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
         unsafe {
             if timed {
@@ -212,7 +228,8 @@ impl Slot {
             None
         };
         let total_ms = ms(stamps[0], stamps[stamps.len() - 1]);
-        Ok(Timing { passes, total_ms, statistics })
+        let ticks = stamps.chunks(2).map(|t| [t[0], t[1]]).collect();
+        Ok(Timing { passes, ticks, total_ms, statistics })
     }
 }
 
