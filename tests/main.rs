@@ -8,6 +8,7 @@ mod gpu;
 mod height;
 mod lod;
 mod measure;
+mod profile;
 mod readme;
 mod synth;
 #[cfg(feature = "viewer")]

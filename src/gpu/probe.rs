@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 
 use super::device::Gpu;
-use super::frames::Recording;
+use super::frames::{Recording, STAMP, read_stamps, stamp};
 use super::terrain::Terrain;
 use crate::draw::{Draw, DrawList, Source, Topology};
 
@@ -101,7 +101,7 @@ impl Probe {
         };
         let pieces = (DRAWS + PIPELINES) as u32;
         let info = vk::QueryPoolCreateInfo::default();
-        let stamps = info.query_type(vk::QueryType::TIMESTAMP).query_count(2 * (pieces + 1));
+        let stamps = info.query_type(vk::QueryType::TIMESTAMP).query_count(STAMP * (pieces + 1));
         let statistics = info
             .query_type(vk::QueryType::PIPELINE_STATISTICS)
             .query_count(pieces)
@@ -117,7 +117,7 @@ impl Probe {
     fn begin(&self, r: &Recording, pieces: usize) {
         // SAFETY: the frame that used the queries last has finished.
         unsafe {
-            self.gpu.raw.reset_query_pool(self.stamps, 0, 2 * (pieces as u32 + 1));
+            self.gpu.raw.reset_query_pool(self.stamps, 0, STAMP * (pieces as u32 + 1));
             if let Some(statistics) = self.statistics {
                 self.gpu.raw.reset_query_pool(statistics, 0, pieces.max(1) as u32);
             }
@@ -125,14 +125,9 @@ impl Probe {
         self.stamp(r, 0);
     }
 
-    /// Stamps the end of everything before: number `k`. llvmpipe takes a stamp while it rasterises what follows it,
-    /// up to the next one: a second one, which nobody reads, parts it from the next draw.
+    /// Stamps the end of everything before.
     fn stamp(&self, r: &Recording, k: usize) {
-        let stage = vk::PipelineStageFlags2::BOTTOM_OF_PIPE;
-        for query in [2 * k, 2 * k + 1] {
-            // SAFETY: the command buffer is being recorded and `begin` reset the query.
-            unsafe { self.gpu.raw.cmd_write_timestamp2(r.commands, stage, self.stamps, query as u32) };
-        }
+        stamp(&self.gpu, r.commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, self.stamps, k as u32);
     }
 
     /// Records piece number `k` under its label and queries.
@@ -155,18 +150,14 @@ impl Probe {
     /// What each piece of the last frame took, once that has finished.
     pub fn read(&self, pieces: usize) -> Result<Vec<Measured>> {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        let mut stamps = vec![0u64; 2 * (pieces + 1)];
+        let stamps = read_stamps(&self.gpu, self.stamps, pieces + 1)?;
         let mut counts = vec![[0u64; 4]; pieces];
-        // SAFETY: the frame wrote these queries and has finished.
-        unsafe {
-            self.gpu.raw.get_query_pool_results(self.stamps, 0, &mut stamps, flags)?;
-            if let (Some(statistics), 1..) = (self.statistics, pieces) {
-                self.gpu.raw.get_query_pool_results(statistics, 0, &mut counts, flags)?;
-            }
+        if let (Some(statistics), 1..) = (self.statistics, pieces) {
+            // SAFETY: the frame wrote these queries and has finished.
+            unsafe { self.gpu.raw.get_query_pool_results(statistics, 0, &mut counts, flags)? };
         }
         let counts = counts.into_iter().map(|c| self.statistics.map(|_| Counts::from(c)));
-        let read: Vec<_> = stamps.into_iter().step_by(2).collect();
-        let ticks = read.windows(2).map(|t| [t[0], t[1]]);
+        let ticks = stamps.windows(2).map(|t| [t[0], t[1]]);
         Ok(ticks.zip(counts).map(|(ticks, counts)| Measured { ticks, counts }).collect())
     }
 }

@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn columns_stand_under_each_other() {
         let rows = [["a", "1"], ["longer", "100"]].map(|row| row.map(str::to_string).to_vec());
-        assert_eq!(table(&["draw", "µs"], rows.into_iter()), "draw      µs\na          1\nlonger  100\n");
+        assert_eq!(table(&["draw", "µs"], rows.into_iter()), "draw     µs\na         1\nlonger  100\n");
     }
 
     #[test]
