@@ -340,14 +340,19 @@ mod with_a_device {
             .current_dir(at)
             .status();
         assert!(built.expect("a C compiler, which building needs too").success());
-        let output = Command::new(env!("CARGO_BIN_EXE_cuesta"))
-            .args(["profile", "demo", "--out", "p", "--size", "64x36", "--frames", "1", "--renderdoc", "--json"])
-            .current_dir(at)
-            .env("LD_PRELOAD", at.join("librenderdoc.so"))
-            .output()
-            .unwrap();
-        assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
-        let printed: Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let profile = |variable: &str, value: PathBuf| -> Value {
+            let output = Command::new(env!("CARGO_BIN_EXE_cuesta"))
+                .args(["profile", "demo", "--out", "p", "--size", "64x36", "--frames", "1", "--renderdoc", "--json"])
+                .current_dir(at)
+                .env(variable, value)
+                .output()
+                .unwrap();
+            assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+            serde_json::from_str(&stdout(&output)).unwrap()
+        };
+        let printed = profile("LD_LIBRARY_PATH", at.to_path_buf());
+        assert!(printed.get("capture").is_none() && !at.join("calls").exists(), "it is not loaded where it can be");
+        let printed = profile("LD_PRELOAD", at.join("librenderdoc.so"));
         assert_eq!(printed["capture"]["file"], "/captures/frame_0.rdc");
         assert!(printed["capture"]["mode"].as_str().unwrap().starts_with("geomipmap"));
         assert_eq!(std::fs::read_to_string(at.join("calls")).unwrap(), "start\nend\n");
