@@ -37,7 +37,7 @@ pub struct Measured {
     view: View,
 }
 
-/// A form submitted in one way.
+/// A form submitted in one way, and what was drawn so.
 struct Mode {
     form: usize,
     submission: Submission,
@@ -77,6 +77,8 @@ pub fn run(
             let stage = &mut stages[mode.form];
             stage.submission = Some(mode.submission);
             let times = stage.draw(forms[mode.form].technique.as_mut(), view, Copy::Nothing)?;
+            let list = &stage.list;
+            (mode.commands, mode.draws, mode.triangles) = (list.commands(), list.draws.len(), list.triangles());
             if round >= WARM_UP {
                 mode.times.push(times);
             }
@@ -97,14 +99,10 @@ fn stage(scene: &Scene, form: &Form, view: &View) -> Result<Stage> {
 /// The modes of a form, its own submission first.
 fn both_ways(k: usize, form: &mut Form, stage: &mut Stage, view: &View) -> Result<[Mode; 2]> {
     stage.draw(form.technique.as_mut(), view, Copy::Nothing)?;
-    let list = &mut stage.list;
-    let own = list.submission;
+    let own = stage.list.submission;
     let other = if own == Submission::Direct { Submission::Indirect } else { Submission::Direct };
-    Ok([own, other].map(|submission| {
-        list.submission = submission;
-        let (commands, draws, triangles) = (list.commands(), list.draws.len(), list.triangles());
-        Mode { form: k, submission, commands, draws, triangles, times: Vec::new() }
-    }))
+    let mode = |submission| Mode { form: k, submission, commands: 0, draws: 0, triangles: 0, times: Vec::new() };
+    Ok([own, other].map(mode))
 }
 
 impl Measured {
