@@ -12,6 +12,7 @@
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
 //! - [`bench`]: error against run time, along named paths.
+//! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
 //! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
@@ -35,6 +36,8 @@ pub mod measure;
 pub mod scene;
 
 pub mod bench;
+
+pub mod profile;
 
 pub mod report;
 

@@ -9,6 +9,7 @@ mod gpu;
 mod height;
 mod lod;
 mod measure;
+mod profile;
 mod readme;
 mod report;
 mod synth;

@@ -6,6 +6,8 @@ pub mod export;
 pub mod info;
 pub mod redraw;
 #[cfg(feature = "vulkan")]
+pub mod profile;
+#[cfg(feature = "vulkan")]
 pub mod render;
 pub mod report;
 pub mod scene;
@@ -55,6 +57,9 @@ pub enum Command {
     /// One picture.
     #[cfg(feature = "vulkan")]
     Render(render::RenderArgs),
+    /// Where a frame's time goes, draw by draw: tables and a trace.
+    #[cfg(feature = "vulkan")]
+    Profile(profile::ProfileArgs),
     /// The as-drawn mesh of one view: PLY, OBJ or GLB.
     Export(export::ExportArgs),
     /// The window.
@@ -108,6 +113,8 @@ fn run(cli: Cli) -> Result<Outcome> {
         Some(Command::Info(args)) => info::run(&common, &args),
         #[cfg(feature = "vulkan")]
         Some(Command::Render(args)) => render::run(&common, &args),
+        #[cfg(feature = "vulkan")]
+        Some(Command::Profile(args)) => profile::run(&common, &args),
         Some(Command::Export(args)) => export::run(&common, &args),
         #[cfg(feature = "viewer")]
         Some(Command::View(args)) => view::run(&common, &args),

@@ -153,6 +153,16 @@ pub enum ColourArg {
     Batch,
 }
 
+impl MetricArg {
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            MetricArg::Certified => "certified",
+            MetricArg::Paper => "paper",
+        }
+    }
+}
+
 fn technique_help() -> String {
     let names = lod::TECHNIQUES.iter().flat_map(|entry| {
         let variants = entry.variants.iter().map(|v| format!("{}:{}", entry.name, v.name));

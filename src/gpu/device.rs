@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
+use super::clock;
 use super::instance::{Instance, version_text};
 use crate::plan::DeviceLimits;
 
@@ -64,6 +65,10 @@ pub struct Gpu {
     /// Allocator of all memory.
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     utils: Option<ext::debug_utils::Device>,
+    /// Reads the clock of timestamps, where the driver can.
+    pub(super) clock: Option<ext::calibrated_timestamps::Device>,
+    /// Valid bits of a timestamp.
+    pub(super) timestamp_bits: u32,
     /// Device bytes in use by purpose.
     pub(super) bytes: Mutex<std::collections::BTreeMap<&'static str, u64>>,
 }
@@ -186,11 +191,13 @@ impl Gpu {
             .dynamic_rendering(true)
             .synchronization2(true)
             .shader_demote_to_helper_invocation(true);
-        let extensions: &[_] = if window { &[khr::swapchain::NAME.as_ptr()] } else { &[] };
+        let has_clock = clock::is_readable(instance, candidate.raw);
+        let wanted = [(window, khr::swapchain::NAME), (has_clock, ext::calibrated_timestamps::NAME)];
+        let extensions: Vec<_> = wanted.into_iter().filter(|(is, _)| *is).map(|(_, name)| name.as_ptr()).collect();
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_features(&core)
-            .enabled_extension_names(extensions)
+            .enabled_extension_names(&extensions)
             .push_next(&mut v12)
             .push_next(&mut v13);
         // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
@@ -211,7 +218,8 @@ impl Gpu {
         let limits = unsafe { instance.raw.get_physical_device_properties(candidate.raw) }.limits;
         // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(candidate.raw) };
-        let has_timestamps = families[candidate.queue_family as usize].timestamp_valid_bits > 0;
+        let timestamp_bits = families[candidate.queue_family as usize].timestamp_valid_bits;
+        let clock = has_clock.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &raw));
         let utils = instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
         let gpu = Arc::new(Self {
             instance: Arc::clone(instance),
@@ -220,11 +228,13 @@ impl Gpu {
             raw,
             queue,
             limits,
-            timestamp_ns: if has_timestamps { f64::from(limits.timestamp_period) } else { 0.0 },
+            timestamp_ns: if timestamp_bits > 0 { f64::from(limits.timestamp_period) } else { 0.0 },
             has_statistics: available.pipeline_statistics_query == vk::TRUE,
             captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             utils,
+            clock,
+            timestamp_bits,
             bytes: Mutex::default(),
         });
         gpu.name(queue, "queue");

@@ -11,12 +11,16 @@ use super::device::Gpu;
 pub const SLOTS: usize = 2;
 /// Passes that a frame may time.
 const SCOPES: u32 = 16;
+/// Queries of a stamp: see [`stamp`].
+pub(super) const STAMP: u32 = 2;
 
 /// What the device did in a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timing {
     /// Name and milliseconds of each pass, in order.
     pub passes: Vec<(&'static str, f64)>,
+    /// Device ticks at the start and the end of each pass.
+    pub ticks: Vec<[u64; 2]>,
     /// Milliseconds from the first pass's start to the last one's end.
     pub total_ms: f64,
     /// Vertices run, primitives after clipping, fragments run — of the pass named `terrain`.
@@ -74,7 +78,7 @@ impl Frames {
         unsafe {
             self.gpu.raw.reset_command_pool(state.pool, vk::CommandPoolResetFlags::empty())?;
             if self.measured {
-                self.gpu.raw.reset_query_pool(state.stamps, 0, 2 * SCOPES);
+                self.gpu.raw.reset_query_pool(state.stamps, 0, 2 * STAMP * SCOPES);
                 if state.statistics != vk::QueryPool::null() {
                     self.gpu.raw.reset_query_pool(state.statistics, 0, 1);
                 }
@@ -130,17 +134,30 @@ impl Frames {
 impl Recording<'_> {
     /// Records a pass under one name: debug label, timestamps, and, for `terrain`, pipeline statistics.
     pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        self.timed_scope(name, name == "terrain", record)
+    }
+
+    /// As [`Self::scope`] without statistics: what is recorded may take its own.
+    pub fn uncounted_scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        self.timed_scope(name, false, record)
+    }
+
+    fn timed_scope<T>(
+        &mut self,
+        name: &'static str,
+        counts: bool,
+        record: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
         let commands = self.commands;
         self.gpu.begin_label(commands, name);
         let timed = self.measured && (self.state.scopes.len() as u32) < SCOPES;
         let first = 2 * self.state.scopes.len() as u32;
-        let counted = timed && name == "terrain" && self.state.statistics != vk::QueryPool::null();
+        let counted = timed && counts && self.state.statistics != vk::QueryPool::null();
         // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
         unsafe {
             if timed {
                 self.state.scopes.push(name);
-                let stage = vk::PipelineStageFlags2::TOP_OF_PIPE;
-                self.gpu.raw.cmd_write_timestamp2(commands, stage, self.state.stamps, first);
+                stamp(self.gpu, commands, vk::PipelineStageFlags2::TOP_OF_PIPE, self.state.stamps, first);
             }
             if counted {
                 self.state.has_statistics = true;
@@ -155,8 +172,7 @@ impl Recording<'_> {
                 self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
             }
             if timed {
-                let stage = vk::PipelineStageFlags2::BOTTOM_OF_PIPE;
-                self.gpu.raw.cmd_write_timestamp2(commands, stage, self.state.stamps, first + 1);
+                stamp(self.gpu, commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, self.state.stamps, first + 1);
             }
         }
         self.gpu.end_label(commands);
@@ -185,8 +201,11 @@ impl Slot {
             gpu.name(commands, "frame");
             let info = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
             let fence = gpu.raw.create_fence(&info, None)?;
-            let stamps =
-                if measured { query(vk::QueryType::TIMESTAMP, 2 * SCOPES, none)? } else { vk::QueryPool::null() };
+            let stamps = if measured {
+                query(vk::QueryType::TIMESTAMP, 2 * STAMP * SCOPES, none)?
+            } else {
+                vk::QueryPool::null()
+            };
             let statistics = if measured && gpu.has_statistics {
                 query(vk::QueryType::PIPELINE_STATISTICS, 1, counted)?
             } else {
@@ -197,10 +216,8 @@ impl Slot {
     }
 
     fn timing(&self, gpu: &Gpu) -> Result<Timing> {
-        let mut stamps = vec![0u64; 2 * self.scopes.len()];
+        let stamps = read_stamps(gpu, self.stamps, 2 * self.scopes.len())?;
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: the frame has ended, so the queries it wrote are available.
-        unsafe { gpu.raw.get_query_pool_results(self.stamps, 0, &mut stamps, flags)? };
         let ms = |from: u64, to: u64| to.wrapping_sub(from) as f64 * gpu.timestamp_ns / 1e6;
         let passes = self.scopes.iter().zip(stamps.chunks(2)).map(|(name, t)| (*name, ms(t[0], t[1]))).collect();
         let statistics = if self.has_statistics {
@@ -212,7 +229,8 @@ impl Slot {
             None
         };
         let total_ms = ms(stamps[0], stamps[stamps.len() - 1]);
-        Ok(Timing { passes, total_ms, statistics })
+        let ticks = stamps.chunks(2).map(|t| [t[0], t[1]]).collect();
+        Ok(Timing { passes, ticks, total_ms, statistics })
     }
 }
 
@@ -229,6 +247,30 @@ impl Drop for Frames {
             }
         }
     }
+}
+
+/// Stamps the time with stamp number `k` of a pool. llvmpipe takes a stamp while it rasterises what follows it, up to
+/// the next one: a second one, which nobody reads, parts it from that.
+pub(super) fn stamp(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    stage: vk::PipelineStageFlags2,
+    pool: vk::QueryPool,
+    k: u32,
+) {
+    for (stage, query) in [(stage, STAMP * k), (vk::PipelineStageFlags2::BOTTOM_OF_PIPE, STAMP * k + 1)] {
+        // SAFETY: the command buffer is being recorded and the queries were reset.
+        unsafe { gpu.raw.cmd_write_timestamp2(commands, stage, pool, query) };
+    }
+}
+
+/// The first stamps of a pool, in device ticks, once their frame has finished.
+pub(super) fn read_stamps(gpu: &Gpu, pool: vk::QueryPool, count: usize) -> Result<Vec<u64>> {
+    let mut ticks = vec![0u64; STAMP as usize * count];
+    let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+    // SAFETY: the frame has ended, so the queries it wrote are available.
+    unsafe { gpu.raw.get_query_pool_results(pool, 0, &mut ticks, flags)? };
+    Ok(ticks.into_iter().step_by(STAMP as usize).collect())
 }
 
 /// Records commands, submits them and waits: for work before the first frame.

@@ -5,6 +5,7 @@
 #![allow(unsafe_code)]
 
 pub mod capture;
+pub mod clock;
 pub mod device;
 pub mod floor;
 pub mod frames;
@@ -15,6 +16,8 @@ pub mod memory;
 pub mod oracle;
 pub mod pages;
 pub mod pipelines;
+pub mod probe;
+pub mod renderdoc;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;

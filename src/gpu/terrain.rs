@@ -1,5 +1,6 @@
 //! The executor: a scene's resources, and draw lists turned into commands.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -177,21 +178,30 @@ impl Terrain {
     /// Records the land and then the sky: between the target's begin and end.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
         recording.scope("terrain", |r| {
-            self.bind_scene(r);
-            let mut first = 0;
-            let kind = |d: &Draw| (d.source, d.topology);
-            for run in list.draws.chunk_by(|a, b| kind(a) == kind(b)) {
-                self.bind_geometry(r, run[0].source);
-                // SAFETY: the pipeline outlives the frame.
-                unsafe {
-                    let pipeline = self.pipelines.terrain(run[0].source, run[0].topology);
-                    self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
-                }
-                self.submit(r, list.submission, first, run);
-                first += run.len();
-            }
+            self.each_run(r, list, |r, run| self.submit(r, list, run));
             Ok(())
         })?;
+        self.draw_sky(recording)
+    }
+
+    /// Calls `record` for each run of draws of one pipeline, with that and its geometry bound.
+    pub(super) fn each_run(&self, r: &Recording, list: &DrawList, mut record: impl FnMut(&Recording, Range<usize>)) {
+        self.bind_scene(r);
+        let mut first = 0;
+        let kind = |d: &Draw| (d.source, d.topology);
+        for run in list.draws.chunk_by(|a, b| kind(a) == kind(b)) {
+            self.bind_geometry(r, run[0].source);
+            // SAFETY: the pipeline outlives the frame.
+            unsafe {
+                let pipeline = self.pipelines.terrain(run[0].source, run[0].topology);
+                self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
+            }
+            record(r, first..first + run.len());
+            first += run.len();
+        }
+    }
+
+    pub(super) fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
         recording.scope("sky", |r| {
             // SAFETY: the pipeline outlives the frame; three vertices without input.
             unsafe {
@@ -213,22 +223,21 @@ impl Terrain {
         self.slots[recording.slot].set
     }
 
-    fn submit(&self, r: &Recording, submission: Submission, first: usize, run: &[Draw]) {
+    /// Records draws of one run as the list says.
+    pub(super) fn submit(&self, r: &Recording, list: &DrawList, draws: Range<usize>) {
         let raw = &self.gpu.raw;
-        match submission {
+        match list.submission {
             Submission::Indirect => {
                 let most = self.gpu.limits.max_draw_indirect_count as usize;
-                for (k, part) in run.chunks(most).enumerate() {
-                    let offset = ((first + k * most) * COMMAND) as u64;
+                for first in draws.clone().step_by(most) {
+                    let (offset, count) = ((first * COMMAND) as u64, most.min(draws.end - first) as u32);
                     let commands = self.slots[r.slot].commands.raw;
                     // SAFETY: the slot's buffer holds these commands until the frame has ended.
-                    unsafe {
-                        raw.cmd_draw_indexed_indirect(r.commands, commands, offset, part.len() as u32, COMMAND as u32);
-                    }
+                    unsafe { raw.cmd_draw_indexed_indirect(r.commands, commands, offset, count, COMMAND as u32) };
                 }
             }
             Submission::Direct => {
-                for draw in run {
+                for draw in &list.draws[draws] {
                     let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
                     // SAFETY: ranges lie in the bound buffers.
                     unsafe {

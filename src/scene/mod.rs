@@ -2,17 +2,18 @@
 
 pub mod capture;
 pub mod holes;
+pub mod probed;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use crate::draw::DrawList;
+use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::{Frames, Timing};
 use crate::gpu::target::{self, Offscreen};
 use crate::gpu::terrain::Terrain;
-use crate::gpu::{Gpu, capture::Capture, floor::Floor};
+use crate::gpu::{Gpu, capture::Capture, floor::Floor, probe::Probe};
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
@@ -39,12 +40,15 @@ pub struct Stage {
     terrain: Terrain,
     floor: Option<Floor>,
     capture: Option<Capture>,
+    probe: Option<Probe>,
     offscreen: Offscreen,
     gpu: Arc<Gpu>,
     field: Arc<Field>,
     plan: ScenePlan,
     look: Look,
     range: [f32; 2],
+    /// How draws reach the device, if not as the technique says.
+    pub submission: Option<Submission>,
     /// What was drawn last.
     pub list: DrawList,
 }
@@ -98,12 +102,14 @@ impl<'a> Scene<'a> {
             terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, resident, limits, formats)?,
             floor: None,
             capture: None,
+            probe: None,
             offscreen: Offscreen::new(self.gpu, size)?,
             gpu: Arc::clone(self.gpu),
             field: Arc::clone(self.field),
             plan: self.plan.clone(),
             look: *self.look,
             range: [statistics.min, statistics.max],
+            submission: None,
             list: DrawList::default(),
         })
     }
@@ -121,8 +127,7 @@ impl Stage {
     /// Selects and draws a view, and waits until the device has finished.
     pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let started = Instant::now();
-        self.list.clear();
-        technique.select(view, &mut self.list);
+        self.select(technique, view);
         let select_ms = ms(started);
         let frame = self.look.frame(&self.field, view, self.range);
         let mut recording = self.frames.begin()?;
@@ -143,6 +148,12 @@ impl Stage {
         self.frames.submit(None, None)?;
         self.frames.finish().context("drawing")?;
         Ok(Times { frame_ms: ms(started), select_ms, upload_ms, record_ms, gpu: self.frames.timing.clone() })
+    }
+
+    fn select(&mut self, technique: &mut dyn Technique, view: &View) {
+        self.list.clear();
+        technique.select(view, &mut self.list);
+        self.list.submission = self.submission.unwrap_or(self.list.submission);
     }
 
     /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed

@@ -258,4 +258,103 @@ mod with_a_device {
         let value = |name: &str| figures.iter().find(|f| f["name"] == name).and_then(|f| f["value"].as_f64()).unwrap();
         assert!(value("index bytes, six classes") < value("index bytes, sixteen masks"));
     }
+
+    /// A table of a profile against the same rows of its document: every cell.
+    fn assert_same_rows(folder: &Path, table: &str, rows: &Value) {
+        let mut reader = csv::Reader::from_path(folder.join(table)).unwrap();
+        let heads = reader.headers().unwrap().clone();
+        let lines: Vec<_> = reader.records().map(|record| record.unwrap()).collect();
+        let rows = rows.as_array().unwrap();
+        assert!(!rows.is_empty() && lines.len() == rows.len(), "{table}: {} lines", lines.len());
+        for (line, row) in lines.iter().zip(rows) {
+            assert_eq!(heads.len(), row.as_object().unwrap().len(), "{table}");
+            for (head, cell) in heads.iter().zip(line) {
+                let same = match &row[head] {
+                    Value::Null => cell.is_empty(),
+                    Value::String(text) => cell == text,
+                    number => cell.parse() == Ok(number.as_f64().unwrap()),
+                };
+                assert!(same, "{table}: {head} is {cell}, {}", row[head]);
+            }
+        }
+    }
+
+    #[test]
+    fn profile_writes_tables_a_document_and_a_trace_that_agree() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let arguments = ["profile", "demo", "--out", "new/p", "--size", "160x90", "--frames", "2", "--validate"];
+        let printed = json(folder.path(), &arguments);
+        let out = folder.path().join("new/p");
+        let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(out.join(name)).unwrap()).unwrap() };
+        assert_eq!(printed, read("profile.json"), "what is printed is what is written");
+        assert_eq!(printed["schema"], 1);
+        assert!(["calibrated", "aligned, not calibrated"].map(Value::from).contains(&printed["clock"]));
+        assert_eq!(printed["frames"], 2);
+        assert_eq!(printed["trace"], "new/p/trace.json");
+        for table in ["passes", "draws", "modes"] {
+            assert_same_rows(&out, &format!("{table}.csv"), &printed[table]);
+        }
+        let slices = crate::profile::trace_format::check(&read("trace.json")).expect("a valid trace");
+        let drawn = slices.iter().filter(|s| s.category == "draw").count();
+        assert_eq!(drawn, printed["draws"].as_array().unwrap().len());
+        assert_eq!(std::fs::read_dir(&out).unwrap().count(), 5, "nothing else is left there");
+    }
+
+    #[test]
+    fn profile_says_in_one_line_what_it_cannot_do() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let arguments = ["profile", "demo", "--out", "p", "--size", "64x36", "--frames", "1", "--renderdoc"];
+        let output = cuesta(folder.path(), &arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(code(&output), 0, "{said}");
+        assert_eq!(said.lines().filter(|line| line.contains("RenderDoc's library is not loaded")).count(), 1, "{said}");
+        let table = stdout(&output);
+        for part in ["terrain", "geomipmap lattice triangles level", "geomipmap:draw-per-block direct", "trace.json"] {
+            assert!(table.contains(part), "{table}");
+        }
+        std::fs::write(folder.path().join("file"), "").unwrap();
+        refused(folder.path(), &["profile", "demo", "--out", "file", "--frames", "1"], &["file", "folder"]);
+        refused(folder.path(), &["profile", "demo", "--out", "q", "--frames", "0"], &["--frames"]);
+        refused(folder.path(), &["profile", "demo"], &["--out"]);
+        assert!(!folder.path().join("q").exists());
+    }
+
+    /// A library of RenderDoc's name whose frame capture notes what it was called for.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_loaded_renderdoc_captures_the_slowest_mode() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let at = folder.path();
+        std::fs::write(at.join("fake.c"), include_str!("renderdoc.c")).unwrap();
+        let built = Command::new("cc")
+            .args(["-shared", "-fPIC", "-Wl,-soname,librenderdoc.so", "-o", "librenderdoc.so", "fake.c"])
+            .current_dir(at)
+            .status();
+        assert!(built.expect("a C compiler, which building needs too").success());
+        let profile = |variable: &str, value: PathBuf| -> Value {
+            let output = Command::new(env!("CARGO_BIN_EXE_cuesta"))
+                .args(["profile", "demo", "--out", "p", "--size", "64x36", "--frames", "1", "--renderdoc", "--json"])
+                .current_dir(at)
+                .env(variable, value)
+                .output()
+                .unwrap();
+            assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+            serde_json::from_str(&stdout(&output)).unwrap()
+        };
+        let printed = profile("LD_LIBRARY_PATH", at.to_path_buf());
+        assert!(printed.get("capture").is_none() && !at.join("calls").exists(), "it is not loaded where it can be");
+        let printed = profile("LD_PRELOAD", at.join("librenderdoc.so"));
+        assert_eq!(printed["capture"]["file"], "/captures/frame_0.rdc");
+        assert!(printed["capture"]["mode"].as_str().unwrap().starts_with("geomipmap"));
+        assert_eq!(std::fs::read_to_string(at.join("calls")).unwrap(), "start\nend\n");
+    }
 }

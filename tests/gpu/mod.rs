@@ -20,7 +20,7 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 /// Runs a test on a device under validation.
-fn on_device(test: impl FnOnce(&Arc<Gpu>)) {
+pub(crate) fn on_device(test: impl FnOnce(&Arc<Gpu>)) {
     let gpu = Instance::new(&[], true).and_then(|instance| Gpu::new(&instance, &Choice::Best, false));
     match gpu {
         Ok(gpu) => {
@@ -38,7 +38,7 @@ fn on_device(test: impl FnOnce(&Arc<Gpu>)) {
 }
 
 /// A technique with settings given as `key=value`.
-fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
+pub(crate) fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
     let (name, variant) = name.split_once(':').map_or((name, None), |(n, v)| (n, Some(v)));
     let entry = lod::find(name).expect("in the table");
     let settings: Vec<_> =
@@ -65,7 +65,7 @@ fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view
 }
 
 /// Mountains with a hole, 16-bit, not square.
-fn mountains() -> Arc<Field> {
+pub(crate) fn mountains() -> Arc<Field> {
     let land = synth::synth(synth::Kind::Fractal, [131, 97], 5);
     let codes = (0..land.samples().len()).map(|k| (land.samples().height(k) * 10.0).round() as u16).collect();
     let samples = Samples::Coded { codes, zero: 0.0, scale: 0.1 };
@@ -85,7 +85,7 @@ fn as_f32(field: &Field) -> Arc<Field> {
 }
 
 /// From the south-west corner over the land.
-fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
+pub(crate) fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
     let [w, h] = field.size().map(f64::from);
     let (low, high) = (field.world_at(0.0, 0.0, 0.0), field.world_at(w - 1.0, h - 1.0, 0.0));
     let top = f64::from(field.statistics().max);

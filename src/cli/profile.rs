@@ -1,0 +1,148 @@
+//! `cuesta profile`: where a frame's time goes, draw by draw, and the ways to submit it side by side.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use clap::Args;
+use serde::Serialize;
+
+use super::render::open;
+use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
+use super::{Common, Outcome, report};
+use crate::gpu::renderdoc::RenderDoc;
+use crate::height::Field;
+use crate::lod::Settings;
+use crate::plan::ScenePlan;
+use crate::profile::run::Measured;
+use crate::profile::{self, Form, Profile, files, rows, table};
+use crate::scene::Scene;
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct ProfileArgs {
+    /// Where heights come from.
+    #[command(flatten)]
+    pub terrain: TerrainArgs,
+    /// Folder for trace.json, profile.json, passes.csv, draws.csv and modes.csv.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Frames behind each median.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub frames: u32,
+    /// Capture the frame of the slowest mode, if RenderDoc is loaded.
+    #[arg(long)]
+    pub renderdoc: bool,
+    /// The view.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// The technique.
+    #[command(flatten)]
+    pub technique: TechniqueArgs,
+    /// The look.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// `profile.json`.
+#[derive(Serialize)]
+struct Document {
+    schema: u32,
+    program: String,
+    terrain: String,
+    technique: String,
+    metric: &'static str,
+    tolerance_px: f64,
+    size: [u32; 2],
+    device: String,
+    driver: String,
+    is_software: bool,
+    #[serde(flatten)]
+    profile: Profile,
+    trace: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    capture: Option<Capture>,
+    validation_messages: Vec<String>,
+}
+
+/// What RenderDoc captured.
+#[derive(Serialize)]
+struct Capture {
+    mode: String,
+    file: PathBuf,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
+    let field = Arc::new(args.terrain.load(common)?.field);
+    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let view = args.view.build(&field, args.technique.tolerance()?)?;
+    let forms = forms(common, args, &field)?;
+    let gpu = open(common, false)?;
+    let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+    let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
+    files::make_folder(&args.out)?;
+    let spinner = report::spinner(common, "profiling");
+    let progress = |done, all| spinner.set_message(format!("profiling: round {done} of {all}"));
+    let mut measured = profile::run(&scene, &view, forms, args.frames, progress)?;
+    let capture = if args.renderdoc { capture(common, &mut measured)? } else { None };
+    drop(spinner);
+    let document = Document {
+        schema: rows::SCHEMA,
+        program: format!("cuesta {}", env!("CARGO_PKG_VERSION")),
+        terrain: args.terrain.terrain.clone(),
+        technique: args.technique.technique.clone(),
+        metric: args.technique.metric.name(),
+        tolerance_px: view.tolerance.px,
+        size: view.size,
+        device: gpu.candidate.name.clone(),
+        driver: gpu.candidate.driver.clone(),
+        is_software: gpu.candidate.is_software(),
+        trace: args.out.join(files::TRACE),
+        capture,
+        validation_messages: gpu.messages(),
+        profile: measured.profile,
+    };
+    files::write(&args.out, &document.profile, &document, &measured.trace)?;
+    if common.json {
+        report::print(common, &document)?;
+    } else if !common.quiet {
+        say(&document);
+    }
+    Ok(if document.validation_messages.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
+}
+
+/// The technique as it was asked for, and then its other forms under the same settings.
+fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<Form>> {
+    let (entry, chosen) = args.technique.settings()?;
+    let variants = std::iter::once(None).chain(entry.variants.iter().map(|variant| Some(variant.name)));
+    let mut variants: Vec<_> = variants.collect();
+    variants.sort_by_key(|variant| *variant != chosen.variant());
+    let form = |variant: Option<&'static str>| {
+        let name = variant.map_or(entry.name.to_string(), |variant| format!("{}:{variant}", entry.name));
+        let settings = Settings::new(entry, variant, &args.technique.settings).map_err(anyhow::Error::msg)?;
+        let _spinner = report::spinner(common, format!("preparing {name}"));
+        Ok(Form { technique: (entry.build)(Arc::clone(field), &settings), name })
+    };
+    variants.into_iter().map(form).collect()
+}
+
+fn capture(common: &Common, measured: &mut Measured) -> Result<Option<Capture>> {
+    let Some(renderdoc) = RenderDoc::loaded() else {
+        report::warn(common, "--renderdoc: no capture: RenderDoc's library is not loaded in this process");
+        return Ok(None);
+    };
+    let (file, mode) = measured.capture_worst(&renderdoc)?;
+    Ok(Some(Capture { mode, file }))
+}
+
+fn say(document: &Document) {
+    print!("{}", table::text(&document.profile));
+    println!("trace: {} (open it in https://ui.perfetto.dev)", document.trace.display());
+    if let Some(capture) = &document.capture {
+        println!("capture: {} of {}", capture.file.display(), capture.mode);
+    }
+    for message in &document.validation_messages {
+        eprintln!("validation: {}", message.replace('\n', " "));
+    }
+}

@@ -1,0 +1,135 @@
+//! The device's clock on the host's, so that both stand on one line of time.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use ash::{ext, vk};
+
+use super::device::Gpu;
+use super::instance::Instance;
+
+/// Readings of both clocks; the one that took the least time counts.
+const READINGS: usize = 8;
+
+/// A moment on both clocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    /// Device ticks.
+    ticks: u64,
+    /// Microseconds after the origin at those ticks.
+    us: f64,
+    /// The origin.
+    origin: Instant,
+    /// Microseconds by which a time may be shifted.
+    pub deviation_us: f64,
+    /// Whether the driver read its clock while the host did; else it lies where the submission and the end of the
+    /// work allow.
+    pub is_calibrated: bool,
+    tick_us: f64,
+    bits: u32,
+}
+
+/// `VK_EXT_calibrated_timestamps`, where the driver has it and reads the clock of timestamps with it.
+pub(super) fn is_readable(instance: &Instance, device: vk::PhysicalDevice) -> bool {
+    // SAFETY: the device is of this instance.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(device) }.unwrap_or_default();
+    let name = Ok(ext::calibrated_timestamps::NAME);
+    if !extensions.iter().any(|extension| extension.extension_name_as_c_str() == name) {
+        return false;
+    }
+    let calibrated = ext::calibrated_timestamps::Instance::new(&instance.entry, &instance.raw);
+    // SAFETY: the device is of this instance and has the extension.
+    let domains = unsafe { calibrated.get_physical_device_calibrateable_time_domains(device) }.unwrap_or_default();
+    domains.contains(&vk::TimeDomainEXT::DEVICE)
+}
+
+impl Clock {
+    /// Reads the device's clock between two readings of the host's; `None` where the driver has no way to.
+    pub fn calibrated(gpu: &Gpu, origin: Instant) -> Result<Option<Self>> {
+        let Some(reader) = &gpu.clock else { return Ok(None) };
+        let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let read = || -> Result<Self> {
+            let before = us(origin, Instant::now());
+            // SAFETY: the device has this time domain: the reader exists only then.
+            let (ticks, _) =
+                unsafe { reader.get_calibrated_timestamps(&domain) }.context("reading the device clock")?;
+            let after = us(origin, Instant::now());
+            Ok(Self::within(gpu, origin, ticks[0], [before, after], true))
+        };
+        let mut best = read()?;
+        for _ in 1..READINGS {
+            let next = read()?;
+            best = if next.deviation_us < best.deviation_us { next } else { best };
+        }
+        Ok(Some(best))
+    }
+
+    /// From work that the host submitted and saw finished at these instants and whose first and last ticks are
+    /// these: the middle of what they allow.
+    pub fn aligned(gpu: &Gpu, origin: Instant, [first, last]: [u64; 2], [submitted, finished]: [Instant; 2]) -> Self {
+        let length = Self::within(gpu, origin, first, [0.0; 2], false).us(last);
+        Self::within(gpu, origin, first, [us(origin, submitted), us(origin, finished) - length], false)
+    }
+
+    /// The ticks fell between these two times.
+    fn within(gpu: &Gpu, origin: Instant, ticks: u64, [from, to]: [f64; 2], is_calibrated: bool) -> Self {
+        Self {
+            ticks,
+            us: (from + to) / 2.0,
+            origin,
+            deviation_us: (to - from).abs() / 2.0,
+            is_calibrated,
+            tick_us: gpu.timestamp_ns / 1e3,
+            bits: gpu.timestamp_bits,
+        }
+    }
+
+    /// Microseconds from the origin to these ticks.
+    pub fn us(&self, ticks: u64) -> f64 {
+        // The sign of the difference is that of its highest valid bit.
+        let unused = 64 - self.bits;
+        let difference = (ticks.wrapping_sub(self.ticks) << unused) as i64 >> unused;
+        self.us + difference as f64 * self.tick_us
+    }
+
+    /// Microseconds from the origin to an instant of the host.
+    pub fn host_us(&self, at: Instant) -> f64 {
+        us(self.origin, at)
+    }
+}
+
+/// Signed microseconds.
+fn us(origin: Instant, at: Instant) -> f64 {
+    1e6 * (at.saturating_duration_since(origin).as_secs_f64() - origin.saturating_duration_since(at).as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_go_both_ways_and_wrap() {
+        let clock = Clock {
+            ticks: (1 << 36) - 10,
+            us: 1000.0,
+            origin: Instant::now(),
+            deviation_us: 0.0,
+            is_calibrated: true,
+            tick_us: 0.5,
+            bits: 36,
+        };
+        assert_eq!(clock.us((1 << 36) - 10), 1000.0);
+        assert_eq!(clock.us((1 << 36) - 30), 990.0);
+        assert_eq!(clock.us(10), 1010.0, "over the end of 36 bits");
+        let whole = Clock { ticks: 5, bits: 64, ..clock };
+        assert_eq!([whole.us(3), whole.us(u64::MAX)], [999.0, 997.0]);
+    }
+
+    #[test]
+    fn the_host_counts_before_and_after_the_origin() {
+        let origin = Instant::now();
+        let later = origin + std::time::Duration::from_micros(250);
+        assert!((us(origin, later) - 250.0).abs() < 1e-6);
+        assert!((us(later, origin) + 250.0).abs() < 1e-6);
+    }
+}

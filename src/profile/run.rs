@@ -1,0 +1,211 @@
+//! The measuring: in every round one frame with queries around its draws, and a plain frame in every mode.
+
+use anyhow::{Result, ensure};
+use serde_json::{Value, json};
+
+use super::estimate::{Estimate, rounded};
+use super::rows::{DrawRow, ModeRow, PassRow, Profile, StepRow};
+use super::{timeline, trace};
+use crate::draw::{DrawList, Submission};
+use crate::gpu::probe;
+use crate::gpu::renderdoc::RenderDoc;
+use crate::lod::Technique;
+use crate::scene::probed::{self, ProbedDraw, ProbedFrame, Span};
+use crate::scene::{Copy, Scene, Stage, Times};
+use crate::view::View;
+
+/// Rounds that are not counted: caches fill, clocks rise.
+const WARM_UP: u32 = 2;
+
+/// A technique, or a variant of it.
+pub struct Form {
+    /// Its name on the command line.
+    pub name: String,
+    /// The technique.
+    pub technique: Box<dyn Technique>,
+}
+
+/// What was measured, and the means to capture more.
+pub struct Measured {
+    /// The rows.
+    pub profile: Profile,
+    /// The frame with the median device time as a trace.
+    pub trace: Value,
+    forms: Vec<Form>,
+    stages: Vec<Stage>,
+    modes: Vec<Mode>,
+    view: View,
+}
+
+/// A form submitted in one way, and what was drawn so.
+struct Mode {
+    form: usize,
+    submission: Submission,
+    commands: usize,
+    draws: usize,
+    triangles: u64,
+    times: Vec<Times>,
+}
+
+/// Measures the first form draw by draw, and all forms under direct and indirect submission, `frames` times in
+/// turn. The scene is planned without morphing. `progress` hears the number of rounds done and to do.
+///
+/// # Errors
+/// If the device fails, has no timestamps, or a technique draws another list for the same view.
+pub fn run(
+    scene: &Scene,
+    view: &View,
+    mut forms: Vec<Form>,
+    frames: u32,
+    progress: impl Fn(u32, u32),
+) -> Result<Measured> {
+    let mut stages = forms.iter().map(|form| stage(scene, form, view)).collect::<Result<Vec<_>>>()?;
+    let mut modes = Vec::new();
+    for (k, (form, stage)) in forms.iter_mut().zip(&mut stages).enumerate() {
+        modes.extend(both_ways(k, form, stage, view)?);
+    }
+    let mut probed = Vec::new();
+    for round in 0..WARM_UP + frames {
+        progress(round, WARM_UP + frames);
+        stages[0].submission = None;
+        let Form { name, technique } = &mut forms[0];
+        let frame = stages[0].draw_probed(technique.as_mut(), name, view)?;
+        // Each mode is the first in its turn.
+        let turn = round as usize % modes.len();
+        for k in (turn..modes.len()).chain(0..turn) {
+            let mode = &mut modes[k];
+            let stage = &mut stages[mode.form];
+            stage.submission = Some(mode.submission);
+            let times = stage.draw(forms[mode.form].technique.as_mut(), view, Copy::Nothing)?;
+            let list = &stage.list;
+            (mode.commands, mode.draws, mode.triangles) = (list.commands(), list.draws.len(), list.triangles());
+            if round >= WARM_UP {
+                mode.times.push(times);
+            }
+        }
+        if round >= WARM_UP {
+            probed.push(frame);
+        }
+    }
+    let (profile, trace) = summary(&stages[0].list, probed, &modes, &forms)?;
+    Ok(Measured { profile, trace, forms, stages, modes, view: *view })
+}
+
+fn stage(scene: &Scene, form: &Form, view: &View) -> Result<Stage> {
+    let plan = scene.plan.clone().with_morph(form.technique.morphs());
+    Scene { plan: &plan, ..scene.clone() }.stage(form.technique.as_ref(), view.size)
+}
+
+/// The modes of a form, its own submission first.
+fn both_ways(k: usize, form: &mut Form, stage: &mut Stage, view: &View) -> Result<[Mode; 2]> {
+    stage.draw(form.technique.as_mut(), view, Copy::Nothing)?;
+    let own = stage.list.submission;
+    let other = if own == Submission::Direct { Submission::Indirect } else { Submission::Direct };
+    let mode = |submission| Mode { form: k, submission, commands: 0, draws: 0, triangles: 0, times: Vec::new() };
+    Ok([own, other].map(mode))
+}
+
+impl Measured {
+    /// Draws the mode whose frames took longest once more within a capture of RenderDoc's, and says to which file
+    /// and which mode.
+    pub fn capture_worst(&mut self, renderdoc: &RenderDoc) -> Result<(std::path::PathBuf, String)> {
+        let rows = self.profile.modes.iter().zip(&self.modes);
+        let (row, mode) = rows.max_by(|a, b| a.0.frame_us.total_cmp(&b.0.frame_us)).expect("a form has two modes");
+        let stage = &mut self.stages[mode.form];
+        stage.submission = Some(mode.submission);
+        let technique = self.forms[mode.form].technique.as_mut();
+        let (_, path) = renderdoc.capture(|| stage.draw(technique, &self.view, Copy::Nothing))?;
+        Ok((path, format!("{} {}", row.form, row.submission)))
+    }
+}
+
+/// Rows and trace; `list` is that of all probed frames.
+fn summary(list: &DrawList, mut probed: Vec<ProbedFrame>, modes: &[Mode], forms: &[Form]) -> Result<(Profile, Value)> {
+    for frame in &probed {
+        let same = frame.draws.iter().map(|d| &d.piece).eq(probed[0].draws.iter().map(|d| &d.piece));
+        ensure!(same, "{}: draws another list for the same view", forms[0].name);
+    }
+    let draws: Vec<_> = (0..probed[0].draws.len()).map(|k| draw_row(list, &probed, k)).collect();
+    let names = probed[0].passes.iter().map(|(pass, _)| *pass);
+    let passes = names.enumerate().map(|(k, pass)| {
+        let us = |frame: &ProbedFrame| frame.passes.get(k).map_or(0.0, |(_, span)| span.us());
+        PassRow::new(pass, Estimate::of(probed.iter().map(us)), &draws)
+    });
+    let names = probed[0].steps.iter().map(|(step, _)| *step);
+    let steps = names
+        .enumerate()
+        .map(|(k, step)| StepRow::new(step, Estimate::of(probed.iter().map(|frame| frame.steps[k].1.us()))));
+    let (passes, steps) = (passes.collect(), steps.collect());
+    let device_us = |frame: &ProbedFrame| frame.passes.iter().map(|(_, span): &(_, Span)| span.us()).sum::<f64>();
+    probed.sort_by(|a, b| device_us(a).total_cmp(&device_us(b)));
+    let median = &probed[(probed.len() - 1) / 2];
+    let clock = if median.is_calibrated { "calibrated" } else { "aligned, not calibrated" }.to_string();
+    let clock_deviation_us = rounded(median.deviation_us);
+    let facts = json!({ "clock": clock, "clock_deviation_us": clock_deviation_us });
+    let trace = trace::document(&timeline::tracks(median, &draws), &timeline::counters(median, &draws), facts);
+    let frames = probed.len() as u32;
+    let modes = modes.iter().map(|mode| mode_row(mode, &modes[0], &forms[mode.form].name)).collect();
+    Ok((Profile { frames, clock, clock_deviation_us, steps, passes, draws, modes }, trace))
+}
+
+fn draw_row(list: &DrawList, probed: &[ProbedFrame], k: usize) -> DrawRow {
+    let ProbedDraw { piece, counts, .. } = &probed[0].draws[k];
+    let draws = &list.draws[piece.draws.clone()];
+    let levels = probed::levels(list, draws);
+    let of_all = |of: fn(&crate::draw::Draw) -> usize| draws.iter().map(|d| of(d) as u64).sum();
+    let time = Estimate::of(probed.iter().map(|frame| frame.draws[k].span.us())).rounded();
+    DrawRow {
+        label: piece.label.clone(),
+        pass: "terrain".to_string(),
+        pipeline: probe::pipeline_name(draws[0].source, draws[0].topology).to_string(),
+        batch: piece.draws.start,
+        draws: draws.len(),
+        level_min: levels.map(|[low, _]| low),
+        level_max: levels.map(|[_, high]| high),
+        instances: of_all(|d| d.instances.len()),
+        vertices: of_all(|d| d.indices.len() * d.instances.len()),
+        triangles: of_all(|d| d.topology.triangles(d.indices.len()) * d.instances.len()),
+        gpu_us: time.median,
+        gpu_us_low: time.low,
+        gpu_us_high: time.high,
+        vertices_run: counts.map(|c| c.vertices),
+        clipping_invocations: counts.map(|c| c.clipped),
+        clipping_primitives: counts.map(|c| c.primitives),
+        fragments_run: counts.map(|c| c.fragments),
+    }
+}
+
+fn mode_row(mode: &Mode, base: &Mode, form: &str) -> ModeRow {
+    let us = |of: fn(&Times) -> f64| Estimate::of(mode.times.iter().map(|t| 1e3 * of(t))).rounded();
+    let ratio = |of: fn(&Times) -> f64| {
+        let pairs = mode.times.iter().zip(&base.times);
+        Estimate::of(pairs.map(|(own, base)| of(own) / of(base).max(f64::MIN_POSITIVE))).rounded()
+    };
+    let (record, gpu) = (us(|t| t.record_ms), us(|t| t.gpu.total_ms));
+    let (record_ratio, gpu_ratio) = (ratio(|t| t.record_ms), ratio(|t| t.gpu.total_ms));
+    let a_draw = |us: f64| rounded(us / mode.draws.max(1) as f64);
+    ModeRow {
+        form: form.to_string(),
+        submission: if mode.submission == Submission::Direct { "direct" } else { "indirect" }.to_string(),
+        commands: mode.commands,
+        draws: mode.draws,
+        triangles: mode.triangles,
+        select_us: us(|t| t.select_ms).median,
+        upload_us: us(|t| t.upload_ms).median,
+        record_us: record.median,
+        record_us_low: record.low,
+        record_us_high: record.high,
+        record_us_per_draw: a_draw(record.median),
+        record_ratio: record_ratio.median,
+        record_ratio_low: record_ratio.low,
+        record_ratio_high: record_ratio.high,
+        gpu_us: gpu.median,
+        gpu_us_low: gpu.low,
+        gpu_us_high: gpu.high,
+        gpu_us_per_draw: a_draw(gpu.median),
+        gpu_ratio: gpu_ratio.median,
+        gpu_ratio_low: gpu_ratio.low,
+        gpu_ratio_high: gpu_ratio.high,
+        frame_us: us(|t| t.frame_ms).median,
+    }
+}
