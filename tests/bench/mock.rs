@@ -195,7 +195,16 @@ pub fn cases(fields: &[(Terrain, Arc<Field>)], paths: &[&str]) -> Vec<Case> {
 
 /// Runs cases to the end into a folder.
 pub fn run(folder: &Path, fields: Vec<(Terrain, Arc<Field>)>, cases: Vec<Case>, rounds: usize) -> Mock {
-    let mut mock = Mock::default();
+    run_with(Mock::default(), folder, fields, cases, rounds)
+}
+
+pub fn run_with(
+    mut mock: Mock,
+    folder: &Path,
+    fields: Vec<(Terrain, Arc<Field>)>,
+    cases: Vec<Case>,
+    rounds: usize,
+) -> Mock {
     let header = header(&mut mock, &fields);
     let stop = AtomicBool::new(false);
     let run = Run { folder, cases, fields, rounds, warm_up: 3, stop: &stop };
