@@ -150,7 +150,7 @@ fn the_page_works_in_a_browser() {
         let smallest = "Math.min(...[...document.querySelectorAll('section.scene:not([hidden]) .own text')].map(t => \
                         (m => Math.hypot(m.a, m.b))(t.getScreenCTM()) * parseFloat(getComputedStyle(t).fontSize)))";
         let smallest = browser.ask(smallest).as_f64().unwrap();
-        assert!(smallest >= if width < 390 { 7.0 } else { 8.5 }, "text of {smallest} px at {width}");
+        assert!(smallest >= if width < 390 { 8.5 } else { 10.0 }, "text of {smallest} px at {width}");
         browser.picture(&format!("{width}{}.png", if dark { "-dark" } else { "" }));
     }
 }
