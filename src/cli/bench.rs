@@ -14,7 +14,7 @@ use super::cases::{Choice, Planned};
 use super::scene::{ReadArgs, size};
 use super::{Common, Outcome, report};
 use crate::bench::compare::{THRESHOLD, compare};
-use crate::bench::results::{RESULTS, Results};
+use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
 use crate::bench::run::{Ended, Run};
 use crate::bench::{Laboratory, SCHEMA};
@@ -136,9 +136,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let header = header(laboratory.as_mut(), &planned)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&stop);
-    // A second handler in one process is refused; then Ctrl-C ends the process, and the rows so far are kept.
-    let _ = ctrlc::set_handler(move || told.store(true, Ordering::Relaxed));
+    stop_on_interrupt(Arc::clone(&stop));
     let run = Run {
         folder,
         cases: planned.cases,
@@ -155,6 +153,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     })?;
     bar.finish_and_clear();
     let page = crate::report::write(folder)?;
+    let found = Results::read(folder)?;
     let rows = crate::bench::journal::read(folder)?.1.len();
     let complete = ended == Ended::Complete;
     if !complete {
@@ -162,7 +161,17 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     }
     let (results, page) = (folder.join(RESULTS), page.display().to_string());
     report::print(common, &Done { results: results.display().to_string(), report: page, rows, complete })?;
-    Ok(Outcome::Done)
+    Ok(if found.cases.iter().any(CaseResult::is_torn) { Outcome::LimitMissed } else { Outcome::Done })
+}
+
+/// The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
+fn stop_on_interrupt(stop: Arc<AtomicBool>) {
+    // A second handler in one process is refused; then Ctrl-C ends the process.
+    let _ = ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
 }
 
 fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {
