@@ -1,9 +1,10 @@
 //! What changed from one benchmark to another: times as ratios with intervals, counts and errors exactly.
 //!
-//! A time is a regression if its whole interval lies above 1 + threshold. Many cases are tested at once, so the
-//! intervals are widened (Bonferroni: the chance of any false alarm of a family stays at 5 %). One case has a handful
-//! of noisy rounds; all cases of a technique together tell much smaller changes from noise, so each technique is
-//! tested as a whole too: round by round the median over its cases of the time relative to the case's own middle.
+//! The cases of a technique are tested together, as they tell much smaller changes from noise than one case with its
+//! handful of rounds: round by round the mean over the cases of the time relative to the case's own middle, without the
+//! extreme fifths. That is a regression if the whole interval lies above 1 + threshold. A single case is one if its
+//! whole interval lies above 1 + twice the threshold. Many things are tested at once, so tails are divided among them
+//! (Bonferroni): the chance of any false alarm stays below 5 % even if the truth is the threshold itself.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +12,12 @@ use serde::Serialize;
 
 use super::results::{CaseResult, Results};
 use super::rows::Errors;
-use super::statistics::{CONFIDENCE, Estimate, middle};
+use super::statistics::{Estimate, middle, trimmed_mean};
 
 /// What is no regression yet: a tenth.
 pub const THRESHOLD: f64 = 0.1;
+/// Chance of any false alarm.
+const ALARM: f64 = 0.05;
 
 /// What changed.
 #[derive(Debug, Serialize)]
@@ -40,7 +43,7 @@ pub struct Change {
     pub what: String,
     /// The ratio, its interval widened for the number of tests.
     pub ratio: Estimate,
-    /// Whether the whole interval lies above 1 + threshold.
+    /// Whether the whole interval lies above what is allowed.
     pub is_regression: bool,
 }
 
@@ -64,16 +67,18 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
     let timed: Vec<_> = pairs.iter().copied().filter(|(a, b)| a.time.is_some() && b.time.is_some()).collect();
-    let test = |what: String, a: &[f64], b: &[f64], family: usize| {
-        let ratio = Estimate::ratio(a, b, 1.0 - (1.0 - CONFIDENCE) / family as f64);
-        Change { what, ratio, is_regression: ratio.low > 1.0 + threshold }
+    let test = |what: String, a: &[f64], b: &[f64], family: usize, allowed: f64| {
+        let ratio = Estimate::ratio(a, b, ALARM / family as f64);
+        Change { what, ratio, is_regression: ratio.low > 1.0 + allowed }
     };
-    let cases: Vec<_> =
-        timed.iter().map(|(a, b)| test(a.case.to_string(), &times(a), &times(b), timed.len())).collect();
+    let cases: Vec<_> = timed
+        .iter()
+        .map(|(a, b)| test(a.case.to_string(), &times(a), &times(b), timed.len(), 2.0 * threshold))
+        .collect();
     let families = by_technique(&timed);
     let pooled = families.iter().map(|(name, pairs)| {
         let [a, b] = pooled(pairs);
-        test(format!("{name}, {} cases", pairs.len()), &a, &b, families.len())
+        test(format!("{name}, {} cases", pairs.len()), &a, &b, families.len(), threshold)
     });
     let techniques: Vec<_> = pooled.collect();
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
@@ -96,7 +101,7 @@ fn by_technique<'a>(pairs: &Pairs<'a>) -> BTreeMap<String, Pairs<'a>> {
     families
 }
 
-/// Round by round, the median over the cases of the time relative to the middle of the case's times in both runs.
+/// Round by round, the trimmed mean over the cases of the time relative to the middle of the case's times in both runs.
 fn pooled(pairs: &Pairs) -> [Vec<f64>; 2] {
     let mut rounds: [BTreeMap<usize, Vec<f64>>; 2] = Default::default();
     for (a, b) in pairs {
@@ -108,7 +113,7 @@ fn pooled(pairs: &Pairs) -> [Vec<f64>; 2] {
             }
         }
     }
-    rounds.map(|rounds| rounds.into_values().map(middle).collect())
+    rounds.map(|rounds| rounds.into_values().map(trimmed_mean).collect())
 }
 
 /// A value of the errors, and whether any growth of it breaks a promise.

@@ -110,6 +110,13 @@ impl Results {
     }
 }
 
+impl CaseResult {
+    /// Whether land was missing where there is some: a crack or a hole.
+    pub fn is_torn(&self) -> bool {
+        self.errors.as_ref().is_some_and(|e| e.watertight == Some(false) || e.hole_pixels.is_some_and(|n| n > 0))
+    }
+}
+
 fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult {
     let at = cases.iter().position(|result| result.case == *case).unwrap_or_else(|| {
         cases.push(CaseResult { case: case.clone(), time: None, errors: None, rounds: Vec::new() });

@@ -14,7 +14,7 @@ use super::cases::{Choice, Planned};
 use super::scene::{ReadArgs, size};
 use super::{Common, Outcome, report};
 use crate::bench::compare::{THRESHOLD, compare};
-use crate::bench::results::{RESULTS, Results};
+use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
 use crate::bench::run::{Ended, Run};
 use crate::bench::{Laboratory, SCHEMA};
@@ -84,7 +84,7 @@ pub struct MeasureArgs {
     #[arg(long, value_name = "N", default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
     /// How often each case is timed.
-    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub rounds: u32,
     /// The public benchmark kit; terrains that are given join it.
     #[arg(long)]
@@ -138,9 +138,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let header = header(laboratory.as_mut(), &planned)?;
     let stop = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&stop);
-    // A second handler in one process is refused; then Ctrl-C ends the process, and the rows so far are kept.
-    let _ = ctrlc::set_handler(move || told.store(true, Ordering::Relaxed));
+    stop_on_interrupt(Arc::clone(&stop));
     let run = Run {
         folder,
         cases: planned.cases,
@@ -157,6 +155,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     })?;
     bar.finish_and_clear();
     let page = crate::report::write(folder)?;
+    let found = Results::read(folder)?;
     let rows = crate::bench::journal::read(folder)?.1.len();
     let complete = ended == Ended::Complete;
     if !complete {
@@ -164,9 +163,19 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     }
     let (results, page) = (folder.join(RESULTS).display().to_string(), page.display().to_string());
     let messages = laboratory.close();
-    let is_valid = messages.is_empty();
+    let is_missed = found.cases.iter().any(CaseResult::is_torn) || !messages.is_empty();
     report::print(common, &Done { results, report: page, rows, complete, validation_messages: messages })?;
-    Ok(if is_valid { Outcome::Done } else { Outcome::LimitMissed })
+    Ok(if is_missed { Outcome::LimitMissed } else { Outcome::Done })
+}
+
+/// The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
+fn stop_on_interrupt(stop: Arc<AtomicBool>) {
+    // A second handler in one process is refused; then Ctrl-C ends the process.
+    let _ = ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
 }
 
 fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {

@@ -34,7 +34,8 @@ impl Range {
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
         let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
         let high = finite.iter().copied().fold(0.0, f64::max);
-        let smallest = finite.iter().copied().filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
+        let shown = |v: &f64| *v > high / 10f64.powf(DECADES);
+        let smallest = finite.iter().copied().filter(shown).fold(f64::INFINITY, f64::min);
         match scale {
             Scale::Linear => {
                 let top = if high > 0.0 { high } else { 1.0 };
@@ -42,8 +43,7 @@ impl Range {
                 Self { scale, low: 0.0, high: (top * 1.02 / step).ceil() * step }
             }
             Scale::Logarithmic if smallest.is_finite() => {
-                let low = smallest.max(high / 10f64.powf(DECADES));
-                Self { scale, low: round_down(low / 1.05), high: round_up(high * 1.05) }
+                Self { scale, low: round_down(smallest / 1.05), high: round_up(high * 1.05) }
             }
             Scale::Logarithmic => Self { scale, low: 0.1, high: 1.0 },
         }
@@ -66,8 +66,11 @@ impl Range {
                 (0..).map(|k| f64::from(k) * step).take_while(|v| *v <= self.high * 1.0001).collect()
             }
             Scale::Logarithmic => {
-                let wide = (self.high / self.low).log10() > 2.2;
-                let marks: &[f64] = if wide { &[1.0] } else { &[1.0, 2.0, 5.0] };
+                let marks: &[f64] = match (self.high / self.low).log10() {
+                    decades if decades > 2.2 => &[1.0],
+                    decades if decades > 0.9 => &[1.0, 2.0, 5.0],
+                    _ => &MARKS[..MARKS.len() - 1],
+                };
                 let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
                 let all = decades.flat_map(|d| marks.iter().map(move |m| m * 10f64.powi(d)));
                 all.filter(|v| (self.low * 0.999..=self.high * 1.001).contains(v)).collect()
@@ -83,7 +86,8 @@ fn step(high: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|s| *s <= rough).unwrap_or(decade)
 }
 
-const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+/// Where a logarithmic axis may end.
+const MARKS: [f64; 8] = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0];
 
 fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());

@@ -9,8 +9,8 @@ use super::html::{escape, number};
 const LEFT: f64 = 10.0;
 const RIGHT: f64 = 22.0;
 /// Room a bar takes: a line of text and the bar below it.
-const ROW: f64 = 36.0;
-const BAR: f64 = 13.0;
+const ROW: f64 = 38.0;
+const BAR: f64 = 14.0;
 const FOOT: f64 = 44.0;
 const TITLE: f64 = 26.0;
 
@@ -111,7 +111,7 @@ impl Bars {
                 "<rect class=\"p{k}\" x=\"{at:.0}\" y=\"4\" width=\"11\" height=\"11\"/><text x=\"{:.0}\" y=\"14\">{part}</text>",
                 at + 15.0
             );
-            at += 30.0 + 6.6 * part.len() as f64;
+            at += 28.0 + 7.4 * part.len() as f64;
         }
         svg
     }

@@ -7,12 +7,12 @@ use super::axis::{Axis, Range, Scale};
 use super::html::{escape, number};
 
 /// Size of a chart, chosen so that its text is legible on a telephone and in half a window.
-pub const WIDTH: f64 = 440.0;
+pub const WIDTH: f64 = 400.0;
 const HEIGHT: f64 = 300.0;
-const LEFT: f64 = 58.0;
+const LEFT: f64 = 60.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 12.0;
-const BOTTOM: f64 = 46.0;
+const BOTTOM: f64 = 48.0;
 /// Room that a file gives to its title, and to each line of the legend.
 const TITLE: f64 = 26.0;
 const LEGEND: f64 = 18.0;
@@ -209,7 +209,7 @@ impl Frame {
             let _ = write!(
                 svg,
                 "<path class=\"grid\" d=\"M{x:.1} {TOP}V{bottom}\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{text}</text>",
-                bottom + 16.0
+                bottom + 17.0
             );
         }
         for tick in self.y.ticks() {
@@ -283,7 +283,7 @@ pub fn legend_line(line: usize, style: usize, name: &str) -> String {
 pub fn style_of_files() -> String {
     let colours = COLOURS.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}"));
     colours.collect::<String>()
-        + "text{font:12px system-ui,sans-serif;fill:#333}.title{font-size:14px;font-weight:600}.series path{fill:currentColor}\
+        + "text{font:13px system-ui,sans-serif;fill:#333}.title{font-size:14px;font-weight:600}.series path{fill:currentColor}\
            .series .line,.whisker{fill:none!important;stroke:currentColor;stroke-width:1.5}.line{opacity:.55}\
            .grid{stroke:#e3e3e3}.axis{fill:none;stroke:#888}.touch{fill:none}.ring{fill:none;stroke:#333;stroke-width:1.5}\
            .guide,.limit{fill:none;stroke:#333;stroke-dasharray:4 4}"

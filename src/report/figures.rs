@@ -162,8 +162,10 @@ fn error_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[
     let guide = Some(pareto(&mut series));
     Chart {
         title: "Error against frame time".to_string(),
-        about: "Left and low is good. Rings and the dashed line: the Pareto front. Whiskers: bootstrap 95 % interval."
-            .to_string(),
+        about:
+            "Left and low is good. Rings and the dashed line: the Pareto front. Whiskers: bootstrap 95 % intervals. \
+                Errors too small for the axis stand on its edge."
+                .to_string(),
         x: axis("largest screen error, px", Scale::Logarithmic),
         y: axis("median frame time, ms", Scale::Logarithmic),
         series,

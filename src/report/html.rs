@@ -11,13 +11,13 @@ pub fn slug(text: &str) -> String {
     plain.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }
 
-/// Three digits that count: 0.0123, 4.56, 78.9, 1234, and 1.23 M from a hundred thousand on.
+/// Three digits that count: 0.0123, 4.56, 78.9, 1234, and 12.3 k from ten thousand on.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return "∞".to_string();
     }
     let size = value.abs();
-    if size >= 1e5 {
+    if size >= 1e4 {
         let (factor, unit) =
             [(1e9, "G"), (1e6, "M"), (1e3, "k")].into_iter().find(|(f, _)| size >= *f).unwrap_or((1.0, ""));
         return format!("{} {unit}", number(value / factor));
@@ -43,6 +43,7 @@ mod tests {
             (4.5678, "4.57"),
             (78.94, "78.9"),
             (1234.6, "1235"),
+            (20_000.0, "20 k"),
             (123456.0, "123 k"),
             (2_340_000.0, "2.34 M"),
             (-0.25, "-0.25"),

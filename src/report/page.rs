@@ -98,17 +98,21 @@ fn controls(figures: &Figures) -> String {
 
 fn section(results: &Results, scene: &SceneFigures, folder: &Path) -> String {
     let absent = "Not measured in this run.";
-    let charts: String = scene.charts.iter().map(|(_, chart)| figure(chart, absent)).collect();
-    let split = if scene.split.rows.is_empty() {
-        empty(&scene.split.title, absent)
+    let bars = &scene.split;
+    let split = if bars.rows.is_empty() {
+        empty(&bars.title, absent)
     } else {
-        framed(&scene.split.title, &scene.split.about, &scene.split.inline())
+        framed("tall", &bars.title, &bars.about, &bars.inline())
     };
+    let mut figures: Vec<String> = scene.charts.iter().map(|(_, chart)| figure(chart, absent)).collect();
+    // The two charts that matter most stand side by side, the tall one beside the others.
+    figures.insert(figures.len().min(2), split);
     format!(
-        "<section class=\"scene\" id=\"{}\"><h2>{}</h2><div class=\"figures\">{charts}{split}</div>\
-         <h3>Every case</h3>{}<h3>The largest errors</h3>{}</section>",
+        "<section class=\"scene\" id=\"{}\"><h2>{}</h2><div class=\"figures\">{}</div>{}\
+         <h3>The largest errors</h3>{}</section>",
         slug(&scene.name),
         escape(&scene.name),
+        figures.concat(),
         tables::cases(results, &scene.name),
         worst(results, &scene.name, folder)
     )
@@ -123,22 +127,27 @@ fn figure(chart: &Chart, absent: &str) -> String {
         drawn += &chart.inline(Form::Linear);
     }
     let class = if chart.has_logarithm() { " class=\"two\"" } else { "" };
-    framed(&chart.title, &chart.about, &format!("<div{class}>{drawn}</div>"))
+    framed("chart", &chart.title, &chart.about, &format!("<div{class}>{drawn}</div>"))
 }
 
-fn framed(title: &str, about: &str, drawn: &str) -> String {
-    format!("<figure><h3>{}</h3>{drawn}<figcaption>{}</figcaption></figure>", escape(title), escape(about))
+fn framed(class: &str, title: &str, about: &str, drawn: &str) -> String {
+    let (title, about) = (escape(title), escape(about));
+    format!("<figure class=\"is-{class}\"><h3>{title}</h3>{drawn}<figcaption>{about}</figcaption></figure>")
 }
 
 fn empty(title: &str, why: &str) -> String {
     format!("<figure class=\"empty\"><h3>{}</h3><p class=\"absent\">{}</p></figure>", escape(title), escape(why))
 }
 
+/// Errors below this, pixels, are not worth a picture.
+const VISIBLE_PX: f64 = 0.01;
+
 /// Of each series the case whose worst frame exceeds its tolerance most, with its pictures.
 fn worst(results: &Results, scene: &str, folder: &Path) -> String {
     let excess = |result: &CaseResult| {
         let worst = result.errors.as_ref().and_then(|errors| errors.worst.as_ref())?;
-        worst.picture.as_ref().map(|_| worst.error_px / result.case.tolerance_px)
+        let is_shown = worst.picture.is_some() && worst.error_px >= VISIBLE_PX;
+        is_shown.then_some(worst.error_px / result.case.tolerance_px)
     };
     let mut chosen: Vec<&CaseResult> = Vec::new();
     for result in results.cases.iter().filter(|result| result.case.scene() == scene && excess(result).is_some()) {
@@ -149,7 +158,7 @@ fn worst(results: &Results, scene: &str, folder: &Path) -> String {
         }
     }
     let shown: String = chosen.iter().filter_map(|result| pair(result, folder)).collect();
-    if shown.is_empty() { "<p class=\"absent\">No pictures were kept.</p>".to_string() } else { shown }
+    if shown.is_empty() { "<p class=\"absent\">No pictures of errors were kept.</p>".to_string() } else { shown }
 }
 
 /// A case's worst frame and its difference from the truth.
@@ -158,7 +167,7 @@ fn pair(result: &CaseResult, folder: &Path) -> Option<String> {
     let name = format!("{}, {} px", result.case.series(), number(result.case.tolerance_px));
     let image = |file: &String, what: &str| {
         let alt = escape(&format!("{name}: {what}"));
-        pictures::data_uri(folder, file).map(|uri| format!("<img alt=\"{alt}\" src=\"{uri}\" loading=\"lazy\">"))
+        pictures::data_uri(folder, file).map(|uri| format!("<img alt=\"{alt}\" src=\"{uri}\">"))
     };
     let picture = image(worst.picture.as_ref()?, "as drawn")?;
     let difference = worst.difference.as_ref().and_then(|file| image(file, "difference from the truth"));

@@ -18,7 +18,7 @@ fn table(columns: &[String], rows: &[Vec<String>], series: &[Option<String>]) ->
         let of = of.map_or(String::new(), |name| format!(" data-series=\"{}\"", escape(name)));
         let _ = write!(html, "<tr{of}>");
         for (cell, column) in row.iter().zip(columns) {
-            let _ = write!(html, "<td data-label=\"{}\">{cell}</td>", escape(column));
+            let _ = write!(html, "<td data-label=\"{}\"><span>{cell}</span></td>", escape(column));
         }
         html += "</tr>";
     }
@@ -32,67 +32,68 @@ fn estimate(e: &Estimate) -> String {
 /// What a case gave that was not measured.
 const ABSENT: &str = "–";
 
-fn or_absent(value: Option<String>) -> String {
-    value.unwrap_or_else(|| ABSENT.to_string())
-}
+/// A column of the cases' tables: its name and what a case has there.
+type Column = (&'static str, fn(&CaseResult) -> Option<String>);
 
-/// The cases of one scene.
+/// What a case took.
+const TIMES: &[Column] = &[
+    ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
+    ("over base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
+    ("over floor", |r| r.time.as_ref()?.over_floor.as_ref().map(estimate)),
+    ("p95, ms", |r| r.time.as_ref().map(|t| number(t.frame_p95_ms))),
+    ("p99, ms", |r| r.time.as_ref().map(|t| number(t.frame_p99_ms))),
+    ("max, ms", |r| r.time.as_ref().map(|t| number(t.frame_max_ms))),
+    ("hitches, %", |r| r.time.as_ref().map(|t| number(t.hitches_percent))),
+    ("triangles", |r| r.time.as_ref().map(|t| number(t.triangles))),
+    ("near-optimal ×", |r| r.errors.as_ref()?.reference?.multiple.map(number)),
+    ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),
+    ("device bytes", |r| r.time.as_ref().map(|t| number(t.device_bytes as f64))),
+];
+
+/// What was wrong with it.
+const ERRORS: &[Column] = &[
+    ("max, px", |r| r.errors.as_ref().map(|e| number(e.error_px.max))),
+    ("99.9 %, px", |r| r.errors.as_ref().map(|e| number(e.error_px.p999))),
+    ("rms, px", |r| r.errors.as_ref().map(|e| number(e.error_px.rms))),
+    ("max, m", |r| r.errors.as_ref().map(|e| number(e.error_m.max))),
+    ("outline, px", |r| r.errors.as_ref()?.silhouette_px.map(|s| number(s.max))),
+    ("frames within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.frames))),
+    ("samples within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.samples))),
+    ("pop p99, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p99_px))),
+    ("FLIP", |r| r.errors.as_ref()?.image.map(|i| number(i.flip))),
+    ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
+    ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
+    ("watertight", |r| r.errors.as_ref()?.watertight.map(|is| if is { "yes" } else { "<b>no</b>" }.to_string())),
+];
+
+/// The cases of one scene: what they took, and what was wrong with them.
 pub fn cases(results: &Results, scene: &str) -> String {
     let cases: Vec<&CaseResult> = results.cases.iter().filter(|result| result.case.scene() == scene).collect();
-    let over = format!("over {}", results.header.base);
-    let columns = [
-        "technique",
-        "tolerance, px",
-        "frame, ms",
-        &over,
-        "over floor",
-        "p95 / p99 / max, ms",
-        "hitches, %",
-        "triangles",
-        "near-optimal ×",
-        "error px, max",
-        "99.9 %",
-        "silhouette",
-        "frames kept, %",
-        "pop p99, px",
-        "FLIP",
-        "holes, px",
-        "watertight",
-    ]
-    .map(str::to_string);
-    let rows: Vec<Vec<String>> = cases.iter().map(|result| case(result)).collect();
-    let series: Vec<_> = cases.iter().map(|result| Some(result.case.series())).collect();
-    // A column in which no case has anything says nothing.
-    let kept: Vec<usize> = (0..columns.len()).filter(|&k| rows.iter().any(|row| row[k] != ABSENT)).collect();
-    let columns: Vec<String> = kept.iter().map(|&k| columns[k].clone()).collect();
-    let rows: Vec<Vec<String>> = rows.iter().map(|row| kept.iter().map(|&k| row[k].clone()).collect()).collect();
-    table(&columns, &rows, &series)
+    let base = escape(&results.header.base);
+    format!(
+        "<h3>What every case took</h3><p class=\"conditions\">The base is {base}. Small: bootstrap 95 % intervals.</p>{}\
+         <h3>How wrong it was</h3>{}",
+        of_cases(&cases, TIMES),
+        of_cases(&cases, ERRORS)
+    )
 }
 
-fn case(result: &CaseResult) -> Vec<String> {
-    let (time, errors) = (result.time.as_ref(), result.errors.as_ref());
-    let of_time =
-        |value: &dyn Fn(&crate::bench::results::TimeSummary) -> Option<String>| or_absent(time.and_then(value));
-    let of_errors = |value: &dyn Fn(&crate::bench::Errors) -> Option<String>| or_absent(errors.and_then(value));
-    vec![
-        escape(&result.case.series()),
-        number(result.case.tolerance_px),
-        of_time(&|t| Some(estimate(&t.frame_ms))),
-        of_time(&|t| t.over_base.as_ref().map(estimate)),
-        of_time(&|t| t.over_floor.as_ref().map(estimate)),
-        of_time(&|t| Some([t.frame_p95_ms, t.frame_p99_ms, t.frame_max_ms].map(number).join(" / "))),
-        of_time(&|t| Some(number(t.hitches_percent))),
-        of_time(&|t| Some(number(t.triangles))),
-        of_errors(&|e| e.reference.and_then(|r| r.multiple).map(number)),
-        of_errors(&|e| Some(number(e.error_px.max))),
-        of_errors(&|e| Some(number(e.error_px.p999))),
-        of_errors(&|e| e.silhouette_px.map(|s| number(s.max))),
-        of_errors(&|e| e.within.map(|w| number(100.0 * w.frames))),
-        of_errors(&|e| e.pop.as_ref().map(|p| number(p.p99_px))),
-        of_errors(&|e| e.image.map(|i| number(i.flip))),
-        of_errors(&|e| e.hole_pixels.map(|n| n.to_string())),
-        of_errors(&|e| e.watertight.map(|is| if is { "yes" } else { "<strong>no</strong>" }.to_string())),
-    ]
+/// A line a case. A column in which no case has anything is left out.
+fn of_cases(cases: &[&CaseResult], columns: &[Column]) -> String {
+    let has = |column: &&Column| cases.iter().any(|case| column.1(case).is_some());
+    let columns: Vec<&Column> = columns.iter().filter(has).collect();
+    if columns.is_empty() {
+        return "<p class=\"absent\">Not measured in this run.</p>".to_string();
+    }
+    let row = |case: &&CaseResult| {
+        let name = format!("{}, {} px", escape(&case.case.series()), number(case.case.tolerance_px));
+        let cells = columns.iter().map(|column| column.1(case).unwrap_or_else(|| ABSENT.to_string()));
+        std::iter::once(name).chain(cells).collect()
+    };
+    let rows: Vec<Vec<String>> = cases.iter().map(row).collect();
+    let names: Vec<String> = std::iter::once("case").chain(columns.iter().map(|c| c.0)).map(str::to_string).collect();
+    let series: Vec<_> = cases.iter().map(|case| Some(case.case.series())).collect();
+    table(&names, &rows, &series)
 }
 
 /// Each published table with ours beside it.

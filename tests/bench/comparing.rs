@@ -62,11 +62,11 @@ fn a_fifth_slower_is_found_and_found_where_it_is() {
         let of = |technique: &str| comparison.techniques.iter().find(|c| c.what.starts_with(technique)).unwrap();
         let slow = of("geomipmap, 10 cases");
         found += usize::from(slow.is_regression);
-        assert!((1.12..1.28).contains(&slow.ratio.value), "{slow:?}");
+        assert!((1.08..1.33).contains(&slow.ratio.value), "{slow:?}");
         assert!(!of("brute-force").is_regression && !of("geomipmap (paper").is_regression, "seed {seed}");
-        assert!(comparison.regressions.iter().all(|what| !what.contains("brute-force")));
+        assert!(comparison.regressions.iter().all(|what| !what.contains("brute-force")), "seed {seed}");
     }
-    assert!(found >= 97, "found {found} times of 100");
+    assert!(found >= 90, "found {found} times of 100");
 }
 
 #[test]

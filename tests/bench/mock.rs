@@ -140,7 +140,7 @@ fn worst(scene: &Scene, error_px: f64) -> Result<Worst> {
     let file = |what: &str| format!("pictures/{name}-{what}.png");
     let [picture, difference] = ["drawn", "difference"].map(file);
     RgbImage::from_fn(320, 180, |x, y| Rgb([(x / 2) as u8, 120, 200 - y as u8])).save(scene.folder.join(&picture))?;
-    let dot = |x: u32, y: u32| if (x * 7 + y * 13) % 97 == 0 { Rgb([255, 120, 0]) } else { Rgb([0, 0, 30]) };
+    let dot = |x: u32, y: u32| if (x * 7 + y * 13).is_multiple_of(97) { Rgb([255, 120, 0]) } else { Rgb([0, 0, 30]) };
     RgbImage::from_fn(320, 180, dot).save(scene.folder.join(&difference))?;
     Ok(Worst { frame: 3, error_px, picture: Some(picture), difference: Some(difference) })
 }
@@ -195,7 +195,16 @@ pub fn cases(fields: &[(Terrain, Arc<Field>)], paths: &[&str]) -> Vec<Case> {
 
 /// Runs cases to the end into a folder.
 pub fn run(folder: &Path, fields: Vec<(Terrain, Arc<Field>)>, cases: Vec<Case>, rounds: usize) -> Mock {
-    let mut mock = Mock::default();
+    run_with(Mock::default(), folder, fields, cases, rounds)
+}
+
+pub fn run_with(
+    mut mock: Mock,
+    folder: &Path,
+    fields: Vec<(Terrain, Arc<Field>)>,
+    cases: Vec<Case>,
+    rounds: usize,
+) -> Mock {
     let header = header(&mut mock, &fields);
     let stop = AtomicBool::new(false);
     let run = Run { folder, cases, fields, rounds, warm_up: 3, stop: &stop };

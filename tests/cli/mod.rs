@@ -5,6 +5,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
+use crate::bench::mock;
+
 /// Runs the program in a folder.
 fn cuesta(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
@@ -151,6 +153,13 @@ fn wrong_use_is_one_line_and_exit_code_2() {
     refused(at, &["synth", "castle", "-o", "a.tif"], &["castle"]);
     refused(at, &["synth", "flat", "--size", "1x1", "-o", "a.tif"], &["--size"]);
     refused(at, &["synth", "flat", "-o", "a.doc"], &["a.doc"]);
+    refused(at, &["bench", "demo"], &["--out"]);
+    refused(at, &["bench", "--out", "run"], &["TERRAIN"]);
+    refused(at, &["bench", "demo", "--out", "run", "--rounds", "0"], &["--rounds"]);
+    refused(at, &["bench", "demo", "--out", "run", "--metric", "best"], &["--metric"]);
+    refused(at, &["bench", "compare", "a"], &["<B>"]);
+    refused(at, &["bench", "compare", "a", "b"], &["rows.jsonl"]);
+    refused(at, &["report", "nowhere"], &["nowhere", "rows.jsonl"]);
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 3, "nothing is left behind");
 }
 
@@ -160,6 +169,35 @@ fn help_names_every_technique() {
     for entry in cuesta::lod::TECHNIQUES {
         assert!(help.contains(entry.name), "{}", entry.name);
     }
+}
+
+#[cfg(not(feature = "vulkan"))]
+#[test]
+fn without_vulkan_bench_says_so() {
+    refused(folder().path(), &["bench", "demo", "--out", "run"], &["built without Vulkan"]);
+}
+
+#[test]
+fn compare_and_report_work_from_rows_alone() {
+    let (folder, fields) = (folder(), vec![mock::field(33)]);
+    for run in ["before", "after"] {
+        mock::run(&folder.path().join(run), fields.clone(), mock::cases(&fields, &["spin"]), 3);
+    }
+    let same = json(folder.path(), &["bench", "compare", "before", "after"]);
+    assert_eq!((same["matched"].as_u64(), same["regressions"].as_array().unwrap().len()), (Some(11), 0));
+    let report = json(folder.path(), &["report", "before"]);
+    for file in ["report", "results"] {
+        assert!(folder.path().join(report[file].as_str().unwrap()).is_file(), "{file}");
+    }
+
+    let rows = folder.path().join("after/rows.jsonl");
+    let text = std::fs::read_to_string(&rows).unwrap();
+    let worse = text.replacen("\"watertight\":true", "\"watertight\":false", 1);
+    std::fs::write(&rows, worse).unwrap();
+    let output = cuesta(folder.path(), &["bench", "compare", "before", "after", "--json"]);
+    assert_eq!(code(&output), 1);
+    let told: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert!(told["regressions"][0].as_str().unwrap().contains("not watertight 1 instead of 0"), "{told}");
 }
 
 #[cfg(feature = "vulkan")]

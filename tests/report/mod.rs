@@ -1,1 +1,4 @@
-//! The report.
+//! The report: drawn from rows alone, whole without a network, legible and usable in a browser.
+
+mod browser;
+mod page;

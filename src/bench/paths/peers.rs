@@ -44,6 +44,11 @@ impl<'a> Line<'a> {
         [0, 1].map(|k| self.from[k] + self.direction[k] * t)
     }
 
+    /// Its length over that of the line it was made after.
+    fn scale(&self) -> f64 {
+        self.length / (TO[0] - FROM[0]).hypot(TO[1] - FROM[1])
+    }
+
     /// Metres per sample of the x axis.
     fn unit(&self) -> f64 {
         self.ground.field.spacing[0]
@@ -87,11 +92,13 @@ pub fn fly(ground: &Ground, frames: usize) -> Vec<Pose> {
     line.poses(frames, -8.0, |t| interpolate(&profile, t))
 }
 
-/// At 420 samples: above the zero of the field it was made for, above the lowest land of any other.
+/// Above all land: at 420 samples over the field that the line was made for, and as far above the highest sample of any
+/// other, or less far over a smaller one.
 pub fn high(ground: &Ground, frames: usize) -> Vec<Pose> {
     let line = Line::over(ground);
     let [low, top] = ground.range;
-    let datum = if low >= 0.0 && top <= RELIEF * line.unit() { 0.0 } else { low };
-    let profile = line.profile();
-    line.poses(frames, -35.0, |t| (datum + HIGH * line.unit()).max(interpolate(&profile, t)))
+    let is_peers = line.scale() == 1.0 && low >= 0.0 && top <= RELIEF * line.unit();
+    let above = (HIGH - RELIEF) * line.unit() * line.scale();
+    let height = if is_peers { HIGH * line.unit() } else { top + above };
+    line.poses(frames, -35.0, |_| height)
 }
