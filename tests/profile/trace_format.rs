@@ -57,13 +57,6 @@ pub struct Slice {
     pub args: Map<String, Value>,
 }
 
-impl Slice {
-    /// Whether all of the other one lies within it.
-    pub fn holds(&self, other: &Slice) -> bool {
-        self.track == other.track && self.ns[0] <= other.ns[0] && other.ns[1] <= self.ns[1]
-    }
-}
-
 /// Holds a trace against the format and returns its slices, or the first thing that is wrong.
 pub fn check(trace: &Value) -> Result<Vec<Slice>, String> {
     let document = Document::deserialize(trace).map_err(|error| error.to_string())?;
