@@ -4,9 +4,9 @@ pub mod bench;
 pub mod cases;
 pub mod export;
 pub mod info;
-pub mod redraw;
 #[cfg(feature = "vulkan")]
 pub mod profile;
+pub mod redraw;
 #[cfg(feature = "vulkan")]
 pub mod render;
 pub mod report;

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::render::open;
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, report};
+use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;
 use crate::height::Field;
 use crate::lod::Settings;
@@ -87,6 +88,8 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let mut measured = profile::run(&scene, &view, forms, args.frames, progress)?;
     let capture = if args.renderdoc { capture(common, &mut measured)? } else { None };
     drop(spinner);
+    let (profile, trace) = measured.finish();
+    let candidate = gpu.candidate.clone();
     let document = Document {
         schema: rows::SCHEMA,
         program: format!("cuesta {}", env!("CARGO_PKG_VERSION")),
@@ -95,15 +98,15 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
         metric: args.technique.metric.name(),
         tolerance_px: view.tolerance.px,
         size: view.size,
-        device: gpu.candidate.name.clone(),
-        driver: gpu.candidate.driver.clone(),
-        is_software: gpu.candidate.is_software(),
+        device: candidate.name.clone(),
+        driver: candidate.driver.clone(),
+        is_software: candidate.is_software(),
         trace: args.out.join(files::TRACE),
         capture,
-        validation_messages: gpu.messages(),
-        profile: measured.profile,
+        validation_messages: Gpu::close(gpu),
+        profile,
     };
-    files::write(&args.out, &document.profile, &document, &measured.trace)?;
+    files::write(&args.out, &document.profile, &document, &trace)?;
     if common.json {
         report::print(common, &document)?;
     } else if !common.quiet {

@@ -106,6 +106,11 @@ fn both_ways(k: usize, form: &mut Form, stage: &mut Stage, view: &View) -> Resul
 }
 
 impl Measured {
+    /// The rows and the trace; what is on the device is given up.
+    pub fn finish(self) -> (Profile, Value) {
+        (self.profile, self.trace)
+    }
+
     /// Draws the mode whose frames took longest once more within a capture of RenderDoc's, and says to which file
     /// and which mode.
     pub fn capture_worst(&mut self, renderdoc: &RenderDoc) -> Result<(std::path::PathBuf, String)> {
