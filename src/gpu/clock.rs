@@ -25,7 +25,15 @@ pub struct Clock {
     /// Whether the driver read its clock while the host did; else it lies where the submission and the end of the
     /// work allow.
     pub is_calibrated: bool,
-    tick_us: f64,
+    unit: Unit,
+}
+
+/// What a tick is.
+#[derive(Clone, Copy, Debug)]
+struct Unit {
+    /// Microseconds.
+    us: f64,
+    /// Valid bits of a count.
     bits: u32,
 }
 
@@ -54,7 +62,7 @@ impl Clock {
             let (ticks, _) =
                 unsafe { reader.get_calibrated_timestamps(&domain) }.context("reading the device clock")?;
             let after = us(origin, Instant::now());
-            Ok(Self::within(gpu, origin, ticks[0], [before, after], true))
+            Ok(Self::within(Unit::of(gpu), origin, ticks[0], [before, after], true))
         };
         let mut best = read()?;
         for _ in 1..READINGS {
@@ -66,35 +74,37 @@ impl Clock {
 
     /// From work that the host submitted and saw finished at these instants and whose first and last ticks are
     /// these: the middle of what they allow.
-    pub fn aligned(gpu: &Gpu, origin: Instant, [first, last]: [u64; 2], [submitted, finished]: [Instant; 2]) -> Self {
-        let length = Self::within(gpu, origin, first, [0.0; 2], false).us(last);
-        Self::within(gpu, origin, first, [us(origin, submitted), us(origin, finished) - length], false)
+    pub fn aligned(gpu: &Gpu, origin: Instant, ticks: [u64; 2], instants: [Instant; 2]) -> Self {
+        Self::enclosed(Unit::of(gpu), origin, ticks, instants)
+    }
+
+    fn enclosed(unit: Unit, origin: Instant, [first, last]: [u64; 2], [submitted, finished]: [Instant; 2]) -> Self {
+        let length = Self::within(unit, origin, first, [0.0; 2], false).us(last);
+        Self::within(unit, origin, first, [us(origin, submitted), us(origin, finished) - length], false)
     }
 
     /// The ticks fell between these two times.
-    fn within(gpu: &Gpu, origin: Instant, ticks: u64, [from, to]: [f64; 2], is_calibrated: bool) -> Self {
-        Self {
-            ticks,
-            us: (from + to) / 2.0,
-            origin,
-            deviation_us: (to - from).abs() / 2.0,
-            is_calibrated,
-            tick_us: gpu.timestamp_ns / 1e3,
-            bits: gpu.timestamp_bits,
-        }
+    fn within(unit: Unit, origin: Instant, ticks: u64, [from, to]: [f64; 2], is_calibrated: bool) -> Self {
+        Self { ticks, us: (from + to) / 2.0, origin, deviation_us: (to - from).abs() / 2.0, is_calibrated, unit }
     }
 
     /// Microseconds from the origin to these ticks.
     pub fn us(&self, ticks: u64) -> f64 {
         // The sign of the difference is that of its highest valid bit.
-        let unused = 64 - self.bits;
+        let unused = 64 - self.unit.bits;
         let difference = (ticks.wrapping_sub(self.ticks) << unused) as i64 >> unused;
-        self.us + difference as f64 * self.tick_us
+        self.us + difference as f64 * self.unit.us
     }
 
     /// Microseconds from the origin to an instant of the host.
     pub fn host_us(&self, at: Instant) -> f64 {
         us(self.origin, at)
+    }
+}
+
+impl Unit {
+    fn of(gpu: &Gpu) -> Self {
+        Self { us: gpu.timestamp_ns / 1e3, bits: gpu.timestamp_bits }
     }
 }
 
@@ -115,13 +125,12 @@ mod tests {
             origin: Instant::now(),
             deviation_us: 0.0,
             is_calibrated: true,
-            tick_us: 0.5,
-            bits: 36,
+            unit: Unit { us: 0.5, bits: 36 },
         };
         assert_eq!(clock.us((1 << 36) - 10), 1000.0);
         assert_eq!(clock.us((1 << 36) - 30), 990.0);
         assert_eq!(clock.us(10), 1010.0, "over the end of 36 bits");
-        let whole = Clock { ticks: 5, bits: 64, ..clock };
+        let whole = Clock { ticks: 5, unit: Unit { us: 0.5, bits: 64 }, ..clock };
         assert_eq!([whole.us(3), whole.us(u64::MAX)], [999.0, 997.0]);
     }
 
@@ -131,5 +140,16 @@ mod tests {
         let later = origin + std::time::Duration::from_micros(250);
         assert!((us(origin, later) - 250.0).abs() < 1e-6);
         assert!((us(later, origin) + 250.0).abs() < 1e-6);
+    }
+
+    /// 2 ms of work between a submission at 0.5 ms and its end at 4.5 ms began between 0.5 and 2.5 ms.
+    #[test]
+    fn uncalibrated_work_lies_in_the_middle_of_what_its_submission_and_end_allow() {
+        let origin = Instant::now();
+        let at = |us| origin + std::time::Duration::from_micros(us);
+        let clock = Clock::enclosed(Unit { us: 2.0, bits: 64 }, origin, [7000, 8000], [at(500), at(4500)]);
+        let found = [clock.us(7000), clock.us(8000), clock.deviation_us];
+        assert!(found.iter().zip([1500.0, 3500.0, 1000.0]).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
+        assert!(!clock.is_calibrated);
     }
 }
