@@ -10,7 +10,7 @@
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
-//! - [`bench`]: error against run time, along named paths.
+//! - [`mod@bench`]: error against run time, along named paths.
 //! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
