@@ -95,7 +95,14 @@ impl Browser {
              const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()"
         );
         let place = self.ask(&place);
+        self.next_frame();
         self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": place[0], "y": place[1] }));
+        self.next_frame();
+    }
+
+    /// Waits until what happened so far is on the screen.
+    fn next_frame(&mut self) {
+        self.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))");
     }
 
     /// Presses a key.
