@@ -11,7 +11,7 @@
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
-//! - [`bench`]: error against run time, along named paths.
+//! - [`mod@bench`]: error against run time, along named paths.
 //! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
 //! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).

@@ -3,24 +3,29 @@
   const all = (selector) => document.querySelectorAll(selector);
   const tip = document.getElementById("tip");
 
-  // The value of a point, beside it and inside the window.
-  const show = (point) => {
-    const box = point.getBoundingClientRect();
-    tip.textContent = point.getAttribute("aria-label");
-    tip.hidden = false;
+  // The value of a point, beside it and inside the window, also while the window scrolls to it.
+  let shown = null;
+  const place = () => {
+    const box = shown.getBoundingClientRect();
     const left = box.left + box.width / 2 - tip.offsetWidth / 2;
     const above = box.top - tip.offsetHeight - 8;
     tip.style.left = Math.max(12, Math.min(left, document.documentElement.clientWidth - tip.offsetWidth - 12)) + "px";
     tip.style.top = (above > 4 ? above : box.bottom + 8) + "px";
   };
-  const hide = () => { tip.hidden = true; };
+  const show = (point) => {
+    shown = point;
+    tip.textContent = point.getAttribute("aria-label");
+    tip.hidden = false;
+    place();
+  };
+  const hide = () => { shown = null; tip.hidden = true; };
   all(".point").forEach((point) => {
     point.addEventListener("pointerenter", () => show(point));
     point.addEventListener("pointerleave", hide);
     point.addEventListener("focus", () => show(point));
     point.addEventListener("blur", hide);
   });
-  addEventListener("scroll", hide, { passive: true });
+  addEventListener("scroll", () => { if (shown) place(); }, { passive: true });
   addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
 
   const toggle = (box) => {
