@@ -3,6 +3,7 @@
 //! Pure computation: no device, no file, no clock. Rooms never use each other.
 
 pub mod brute_force;
+pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
 
@@ -65,7 +66,7 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY];
+pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

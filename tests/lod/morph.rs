@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use cuesta::draw::weights::{self, ONE};
 use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use cuesta::height::{Field, synth};
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
@@ -32,7 +33,9 @@ fn view(eye: DVec3, target: DVec3, px: f64) -> View {
 fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph: [f32; 4]) -> DrawList {
     let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
     let turns = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
-    let instance = Instance { origin, cells: 16, turns, level, morph, edge_morph, ..Instance::default() };
+    let weight = |w: f32| (w * ONE as f32) as u32;
+    let weights = weights::uniform(weight(morph), edge_morph.map(weight));
+    let instance = Instance { origin, cells: 16, turns, level, weights, ..Instance::default() };
     let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
     let draws = ranges.map(|indices| Draw {
         source: Source::Lattice,
