@@ -208,3 +208,90 @@ fn range_of_land(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2] {
     let heights = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i, j)));
     heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::surface::{Corner, deviation};
+    use crate::height::{Holes, Samples, rtin};
+
+    const MEASURE: Measure = Measure { cells: 8, growth: 1.0, errors: true, morph: false };
+
+    fn rough(size: [u32; 2], seed: u32) -> Field {
+        let count = (size[0] * size[1]) as usize;
+        let mut state = seed;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let heights = (0..count as u32).map(|k| {
+            let wave = ((k % size[0]) as f32 / 5.0).sin() + ((k / size[0]) as f32 / 9.0).cos();
+            20.0 * wave + 3.0 * random()
+        });
+        Field::new(Samples::F32(heights.collect()), size, [1.0; 2], Holes::none(count))
+    }
+
+    /// The same land with every sample of every tile held.
+    fn held(field: &Field) -> Field {
+        let [w, h] = field.size();
+        let heights = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
+        Field::new(Samples::F32(heights), [w, h], field.spacing, Holes::none((w * h) as usize))
+    }
+
+    fn squares(bounds: &Bounds) -> Vec<(u32, [u32; 2])> {
+        let count = |level: u32, k: usize| bounds.last[k].div_ceil(bounds.side(level));
+        let of = |level: u32| {
+            let [w, h] = [count(level, 0), count(level, 1)];
+            (0..w * h).map(move |k| (level, [k % w, k / w]))
+        };
+        (0..bounds.levels()).flat_map(of).collect()
+    }
+
+    /// The error of a square's own triangles the slow way, its sides on or off the next level.
+    fn slow_error(field: &Field, level: u32, at: [u32; 2], stitched: bool) -> f32 {
+        let last = field.size().map(|n| n as i32 - 1);
+        let corner = |[i, j]: [i32; 2]| {
+            let fall = |n: i32, on: bool| if stitched && on { n & !1 } else { n };
+            let (on_x, on_z) = (i == 0 || i == 8, j == 0 || j == 8);
+            let place = [fall(i, on_z && !on_x), fall(j, on_x && !on_z)];
+            let [x, z] = [0, 1].map(|k| ((at[k] as i32 * 8 + place[k]) << level).min(last[k]));
+            Corner { x, z, y: field.height(x as u32, z as u32) }
+        };
+        let triangles = (0..8).flat_map(|j| (0..8).flat_map(move |i| rtin::cell(i, j)));
+        let triangles = triangles.map(|t| t.map(corner)).filter(|t| surface::doubled_area(t) != 0);
+        triangles.map(|t| deviation(field, &t)).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn errors_are_those_of_the_triangles() {
+        let field = rough([75, 52], 3);
+        let bounds = Bounds::new(&field, MEASURE);
+        assert_eq!(bounds.levels(), 5);
+        for (level, at) in squares(&bounds) {
+            let slow =
+                [false, true].map(|stitched| slow_error(&field, level, at, stitched)).into_iter().fold(0.0, f32::max);
+            let inner = (0..4).filter(|_| level > 0).map(|k| [2 * at[0] + k % 2, 2 * at[1] + k / 2]);
+            let inside = inner.filter(|child| (0..2).all(|k| child[k] * bounds.side(level - 1) < bounds.last[k]));
+            let slow = inside.map(|child| bounds.square(level - 1, child).error).fold(slow, f32::max);
+            let error = bounds.square(level, at).error;
+            assert!((error - slow).abs() <= 1e-5 * slow, "level {level} at {at:?}: {error} m, slowly {slow} m");
+        }
+    }
+
+    #[test]
+    fn what_is_known_of_a_tiled_field_holds_in_every_tile() {
+        for (size, tiles) in [([41, 30], [3, 4]), ([32, 64], [3, 2]), ([33, 57], [4, 1]), ([16, 16], [9, 9])] {
+            let field = rough(size, 9).tiled(tiles);
+            let (tiled, whole) = (Bounds::new(&field, MEASURE), Bounds::new(&held(&field), MEASURE));
+            assert!(tiled.bytes() < whole.bytes());
+            for (level, at) in squares(&whole) {
+                let (general, exact) = (tiled.square(level, at), whole.square(level, at));
+                let what = format!("{size:?} {tiles:?} level {level} at {at:?}: {general:?} {exact:?}");
+                assert!(general.error >= exact.error * (1.0 - 1e-6), "{what}");
+                assert!(general.range[0] <= exact.range[0] && general.range[1] >= exact.range[1], "{what}");
+                let aligned = size.iter().all(|n| n.is_multiple_of(8 << level)) && !whole.is_partial(level, at);
+                assert!(!aligned || general == exact, "{what}");
+            }
+        }
+    }
+}

@@ -28,7 +28,8 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
-    /// Whether its lattice vertices morph ([`Instance::morph`](crate::draw::Instance)).
+    /// Whether its instances have weights ([`weights`](crate::draw::weights)): its lattice vertices morph, or fall
+    /// onto coarser sides.
     fn morphs(&self) -> bool {
         false
     }

@@ -11,18 +11,18 @@ use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
 use cuesta::height::Field;
 use cuesta::plan::{Look, ScenePlan};
+use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with made-up morph weights if they are to morph,
-/// and explicit vertices with weights of their own.
-fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> Vec<Query> {
-    let mut geomipmap = technique(field, "geomipmap", &["block=17"]);
+/// Every vertex of every third instance that a technique draws, with made-up weights if they are to morph.
+fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], morph: bool) -> Vec<Query> {
+    let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
-    geomipmap.select(frame_view, &mut list);
-    let lattice = &geomipmap.resident().lattice;
-    let lattice_queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        // Any bytes are weights; quadrants of level 0 cannot be finer.
+    technique.select(view, &mut list);
+    let lattice = &technique.resident().lattice;
+    let queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
         let weights = [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
@@ -33,6 +33,16 @@ fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> 
             explicit_height: 0,
         })
     });
+    queries.collect()
+}
+
+/// Lattice vertices of two techniques, and explicit vertices with weights of their own.
+fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
+    let mut queries = lattice_queries(field, view, "geomipmap", &["block=17"], morph);
+    // Without weights the program does not know of half samples.
+    if morph {
+        queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on"], morph));
+    }
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
             position: [(k % 37) as i32, (k / 37) as i32],
@@ -43,7 +53,8 @@ fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> 
         instance: Instance { origin: [5, 3], cells: 64, shift: (k % 2) as i32, turns: k % 4, ..Instance::default() },
         explicit_height: 1,
     });
-    lattice_queries.chain(explicit).collect()
+    queries.extend(explicit);
+    queries
 }
 
 fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {

@@ -8,7 +8,6 @@ use cuesta::draw::{DrawList, Submission};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::Technique;
 use cuesta::view::{Lens, Metric, Tolerance, View};
-use glam::DVec3;
 
 use super::technique;
 
@@ -22,7 +21,8 @@ fn random(seed: &mut u64) -> f64 {
 fn land(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
     let count = (size[0] * size[1]) as usize;
     let roughness: Vec<f64> = (0..32 * 32).map(|_| 100.0 * random(seed).powi(12)).collect();
-    let at = |k: usize| roughness[k / size[0] as usize / 10 * 32 + k % size[0] as usize / 10];
+    let square = 6 + (40.0 * random(seed)) as usize;
+    let at = |k: usize| roughness[k / size[0] as usize / square * 32 + k % size[0] as usize / square];
     let heights = (0..count).map(|k| (at(k) * random(seed)) as f32).collect();
     let mut holes = Holes::none(count);
     if random(seed) < 0.3 {
@@ -69,8 +69,8 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode() {
     for k in 0..50 {
         let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129]][k % 4]);
         let settings = ["block=8", ["morph=off", "morph=on"][k / 2 % 2]];
-        let mut modes =
-            ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"].map(|m| technique(&field, m, &settings));
+        let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
+            .map(|m| technique(&field, m, &settings));
         for _ in 0..20 {
             let view = anywhere(&field, &mut seed);
             let [(indirect, list), (cluster, each), (block, single)] =

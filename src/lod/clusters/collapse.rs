@@ -54,6 +54,9 @@ impl Collapse<'_> {
                 Containment::Inside => true,
             };
         if node.level == 0 || self.refinement.weight(tree, node).is_none() {
+            if !inside && !self.any_in_sight(node) {
+                return NOTHING;
+            }
             if self.single {
                 drawn.push((0, self.block(node)));
             }
@@ -69,18 +72,29 @@ impl Collapse<'_> {
         NOTHING
     }
 
+    /// Whether any of the finest blocks in a node that crosses the frustum's border may be seen: with the box of the
+    /// whole alone a coarse block might be drawn where finer ones are not, and a wider tolerance would draw more.
+    fn any_in_sight(&self, node: Node) -> bool {
+        let tree = self.sight.tree;
+        node.level == 0
+            || (0..4).map(|quadrant| node.child(quadrant)).filter(|child| tree.contains(*child)).any(|child| {
+                let containment = tree.known(child).map(|known| self.frustum.contains(&known.bounds));
+                match containment {
+                    None | Some(Containment::Outside) => false,
+                    Some(Containment::Inside) => true,
+                    Some(Containment::Crossing) => self.any_in_sight(child),
+                }
+            })
+    }
+
     fn push_cluster(&self, node: Node, state: State, drawn: &mut Vec<(u32, Instance)>) {
         if self.single {
             return;
         }
         let (seed, turns) = self.seeds.of(state);
         let level = node.level - 1;
-        let instance = Instance {
-            turns,
-            cells: 4 * self.cells,
-            weights: self.weights(node, state),
-            ..self.placed(node, level)
-        };
+        let instance =
+            Instance { turns, cells: 4 * self.cells, weights: self.weights(node, state), ..self.placed(node, level) };
         drawn.push((seed as u32, instance));
     }
 

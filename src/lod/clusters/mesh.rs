@@ -24,7 +24,8 @@ impl Mesh {
         let mut indices: Vec<u32> = Vec::new();
         let mut append = |state: &State| {
             let first = indices.len() as u32;
-            let quadrants = state.iter().enumerate().flat_map(|(quadrant, &what)| quadrant_triangles(n, quadrant, what));
+            let quadrants =
+                state.iter().enumerate().flat_map(|(quadrant, &what)| quadrant_triangles(n, quadrant, what));
             indices.extend(quadrants.flatten().map(index));
             first..indices.len() as u32
         };

@@ -92,7 +92,8 @@ mod tests {
         let set = |mesh: &Mesh, seed: usize, turns: u32| -> BTreeSet<[[i32; 2]; 3]> {
             let range = &mesh.ranges[seed];
             let indices = &mesh.geometry.indices[range.start as usize..range.end as usize];
-            let turn = |[x, z]: [i32; 2]| [[x, z], [4 * n - z, x], [4 * n - x, 4 * n - z], [z, 4 * n - x]][turns as usize];
+            let turn =
+                |[x, z]: [i32; 2]| [[x, z], [4 * n - z, x], [4 * n - x, 4 * n - z], [z, 4 * n - x]][turns as usize];
             let corner = |&k: &u32| turn(mesh.geometry.lattice[k as usize].position);
             // Corners in cyclic order from the smallest: the winding counts.
             let canonical = |t: &[u32]| {

@@ -114,7 +114,8 @@ impl Tree {
             let side = self.bounds.side(node.level);
             let first = self.first(node);
             let at = |k: usize, n: u32| self.origin[k] + f64::from(n.min(self.last[k])) * self.spacing[k];
-            let corner = |add: u32, y: f32| glam::DVec3::new(at(0, first[0] + add), f64::from(y), at(1, first[1] + add));
+            let corner =
+                |add: u32, y: f32| glam::DVec3::new(at(0, first[0] + add), f64::from(y), at(1, first[1] + add));
             let bounds = Aabb { min: corner(0, square.range[0]), max: corner(side, square.range[1]) };
             Known { bounds, error: self.error(node.level, square.error) }
         })

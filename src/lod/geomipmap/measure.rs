@@ -11,10 +11,10 @@
 //! levels coarser on the sides, and v = 1 with e = 0, level l + 1 inside and level l on the sides.
 
 use super::mesh;
-use crate::draw::weights::{self, ONE};
 use crate::draw::Instance;
 use crate::draw::layout::Frame;
 use crate::draw::place::{lattice_height, lattice_position, turned_position};
+use crate::draw::weights::{self, ONE};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle};
 
