@@ -107,10 +107,14 @@ impl Bounds {
 
     /// The square at a place among those of its level.
     pub fn square(&self, level: u32, at: [u32; 2]) -> Square {
+        if self.period == [None; 2] {
+            let held = &self.levels[level as usize];
+            return held.squares[(at[1] * held.count[0] + at[0]) as usize];
+        }
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);
         // The end of a tiled field cuts squares that are measured whole.
-        let cut = self.measure.errors && self.period != [None; 2] && square.has_land() && self.is_partial(level, at);
+        let cut = self.measure.errors && square.has_land() && self.is_partial(level, at);
         if cut { Square { error: square.error.max(square.range[1] - square.range[0]), ..square } } else { square }
     }
 

@@ -29,37 +29,41 @@ impl Patch<'_> {
 
     /// The largest vertical distance, metres, of its cells from the samples in them, holes excepted.
     pub fn deviation(&self) -> f32 {
-        let row = |j: u32| (0..self.cells[0]).map(|i| self.cell_deviation(i, j)).fold(0.0, f64::max);
+        let row = |j: u32| self.row_deviation(j);
         let largest = (0..self.cells[1]).into_par_iter().map(row).reduce(|| 0.0, f64::max);
         // Upwards: the bound must not shrink by rounding.
         (largest as f32).next_up() * f32::from(largest > 0.0)
     }
 
-    fn cell_deviation(&self, i: u32, j: u32) -> f64 {
-        let ([x0, z0], [x1, z1]) = (self.at([i, j]), self.at([i + 1, j + 1]));
-        if x0 == x1 || z0 == z1 {
+    /// A row of cells, sample row by sample row.
+    fn row_deviation(&self, j: u32) -> f64 {
+        let ([x0, z0], [x1, z1]) = (self.at([0, j]), self.at([self.cells[0], j + 1]));
+        let depth = z1 - z0;
+        if depth == 0 {
             return 0.0;
         }
-        let height = |x: u32, z: u32| f64::from(self.field.height(x, z));
-        let [a, b, c, d] = [height(x0, z0), height(x1, z0), height(x0, z1), height(x1, z1)];
-        let [width, depth] = [x1 - x0, z1 - z0];
-        let even = (i + j) & 1 == 0;
+        let mut samples = Vec::with_capacity((x1 - x0 + 1) as usize);
         let mut largest = 0.0f64;
+        let heights = |z: u32| -> Vec<f64> {
+            (0..=self.cells[0]).map(|i| f64::from(self.field.height(self.at([i, 0])[0], z))).collect()
+        };
+        let (north, south) = (heights(z0), heights(z1));
         for v in 0..=depth {
-            let t = f64::from(v) / f64::from(depth);
-            let [west, east] = [a + (c - a) * t, b + (d - b) * t];
-            // Left and right of the diagonal the row rises by the slope of that triangle's level edge.
-            let (split, left, right) = if even {
-                (v * width / depth, (d - c) / f64::from(width), (b - a) / f64::from(width))
-            } else {
-                ((depth - v) * width / depth, (b - a) / f64::from(width), (d - c) / f64::from(width))
-            };
-            for u in 0..=width {
-                let y = if u <= split { west + left * f64::from(u) } else { east - right * f64::from(width - u) };
-                let off = (y - height(x0 + u, z0 + v)).abs();
-                if off > largest && !self.field.is_hole(x0 + u, z0 + v) {
-                    largest = off;
+            samples.clear();
+            samples.extend((x0..=x1).map(|x| self.field.height(x, z0 + v)));
+            let part = f64::from(v) / f64::from(depth);
+            for i in 0..self.cells[0] {
+                let [first, last] = [i, i + 1].map(|i| self.at([i, 0])[0]);
+                if first == last {
+                    break;
                 }
+                let k = i as usize;
+                let corners = [north[k], north[k + 1], south[k], south[k + 1]];
+                let section = Section::new(corners, part, last - first, (i + j) & 1 == 0);
+                let off = section.deviation(&samples[(first - x0) as usize..=(last - x0) as usize], |u| {
+                    self.field.is_hole(first + u, z0 + v)
+                });
+                largest = largest.max(off);
             }
         }
         largest
@@ -103,6 +107,40 @@ impl Patch<'_> {
     fn corner(&self, vertex: [u32; 2]) -> Corner {
         let [x, z] = self.at(vertex);
         Corner { x: x as i32, z: z as i32, y: self.field.height(x, z) }
+    }
+}
+
+/// A cell's surface over one row of samples: a line up to the diagonal, and another one beyond it.
+struct Section {
+    /// The last sample on the first line.
+    split: usize,
+    /// Height at the row's first sample and rise a sample, metres.
+    lines: [[f64; 2]; 2],
+}
+
+impl Section {
+    /// At `part` of the way from the north (corners 0 and 1) to the south (2 and 3); both triangles rise along the
+    /// row as their own side of the cell does.
+    fn new([a, b, c, d]: [f64; 4], part: f64, width: u32, even: bool) -> Self {
+        let width = f64::from(width);
+        let [west, east] = [a + (c - a) * part, b + (d - b) * part];
+        let [north, south] = [(b - a) / width, (d - c) / width];
+        let ([left, right], split) = if even { ([south, north], part) } else { ([north, south], 1.0 - part) };
+        Self { split: (split * width) as usize, lines: [[west, left], [east - right * width, right]] }
+    }
+
+    fn deviation(&self, samples: &[f32], is_hole: impl Fn(u32) -> bool) -> f64 {
+        let (left, right) = samples.split_at((self.split + 1).min(samples.len()));
+        let mut largest = 0.0f64;
+        for (first, samples, [start, rise]) in [(0, left, self.lines[0]), (left.len(), right, self.lines[1])] {
+            for (u, &sample) in samples.iter().enumerate() {
+                let off = (start + rise * (first + u) as f64 - f64::from(sample)).abs();
+                if off > largest && !is_hole((first + u) as u32) {
+                    largest = off;
+                }
+            }
+        }
+        largest
     }
 }
 

@@ -127,7 +127,8 @@ impl Clusters {
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.clear();
         loop {
-            let sight = Sight { tree: &self.tree, view: &wider, frustum: (!self.morph).then_some(&frustum) };
+            let allowance = wider.allowance();
+            let sight = Sight { tree: &self.tree, allowance: &allowance, frustum: (!self.morph).then_some(&frustum) };
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
                 Collapse { sight, frustum: &frustum, refinement, seeds, cells: self.cells, single }.run(&mut drawn);

@@ -14,7 +14,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::tree::{Known, Node, Tree, ratio};
 use crate::draw::weights::ONE;
-use crate::view::{Containment, Frustum, View};
+use crate::view::{Allowance, Containment, Frustum};
 
 /// A node that is split.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +40,8 @@ pub struct Refinement {
 pub struct Sight<'a> {
     /// The quadtree.
     pub tree: &'a Tree,
-    /// The view.
-    pub view: &'a View,
+    /// The view's tolerance.
+    pub allowance: &'a Allowance,
     /// Nodes outside it are left as they are; `None`: none are, so that no turn of the eye changes what is seen.
     pub frustum: Option<&'a Frustum>,
 }
@@ -80,7 +80,7 @@ impl Refinement {
                 Some(Containment::Crossing) => false,
                 Some(Containment::Inside) | None => true,
             };
-        let ratio = ratio(sight.view, &known);
+        let ratio = ratio(sight.allowance, &known);
         if ratio >= self.end {
             return;
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure};
-use crate::view::{Aabb, View};
+use crate::view::{Aabb, Allowance};
 
 /// A square of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -132,6 +132,6 @@ impl Tree {
 }
 
 /// What the tolerance allows in a node over what it has: below 1 it is too coarse.
-pub fn ratio(view: &View, known: &Known) -> f64 {
-    view.allowed_error(&known.bounds) / f64::from(known.error.max(f32::MIN_POSITIVE))
+pub fn ratio(allowance: &Allowance, known: &Known) -> f64 {
+    allowance.error(&known.bounds) / f64::from(known.error.max(f32::MIN_POSITIVE))
 }
