@@ -14,5 +14,5 @@ layout(location = 3) in float in_weight;
 void main() {
     Instance instance = instance_attributes();
     ivec2 at = lattice_position(instance, turned_position(instance, in_position));
-    emit_vertex(at, morphed_height(in_height, in_target, in_weight), instance);
+    emit_vertex(at, morphed_height(in_height, in_target, in_weight), instance.level, instance.batch);
 }

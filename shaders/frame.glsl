@@ -11,5 +11,5 @@ layout(constant_id = 0) const bool CODED = false;
 layout(constant_id = 1) const bool TILED = false;
 // Side of a page as a power of two; 0: one page holds all.
 layout(constant_id = 2) const uint PAGE_SHIFT = 0;
-// Lattice vertices go over to the next coarser level.
+// Lattice vertices have weights: they go over to the next coarser level, or fall onto coarser sides.
 layout(constant_id = 7) const bool MORPH = false;

@@ -2,13 +2,12 @@
 
 layout(location = 8) in ivec2 in_origin;
 layout(location = 9) in uint in_cells;
-layout(location = 10) in uint in_shift;
+layout(location = 10) in int in_shift;
 layout(location = 11) in uint in_turns;
 layout(location = 12) in uint in_level;
 layout(location = 13) in uint in_batch;
-layout(location = 14) in float in_morph;
-layout(location = 15) in vec4 in_edge_morph;
+layout(location = 14) in uvec4 in_weights;
 
 Instance instance_attributes() {
-    return Instance(in_origin, in_cells, in_shift, in_turns, in_level, in_batch, in_morph, in_edge_morph);
+    return Instance(in_origin, in_cells, in_shift, in_turns, in_level, in_batch, in_weights);
 }

@@ -17,6 +17,7 @@ void main() {
     if (k >= queries.length()) return;
     Query query = queries[k];
     ivec2 turned = turned_position(query.instance, query.vertex.position);
+    if (MORPH && query.explicit_height == 0) turned = stitched_position(query.instance, turned);
     float height;
     if (query.explicit_height != 0) height = morphed_height(query.vertex.height, query.vertex.target, query.vertex.morph);
     else if (MORPH) height = lattice_height(query.instance, turned);

@@ -30,8 +30,63 @@ ivec2 turned_position(Instance instance, ivec2 position) {
     return position;
 }
 
+// Weights: src/draw/weights.rs.
+const uint ONE = 64;
+const uint FINER = 128;
+const uint STITCHED = 128;
+
+uint get(Instance instance, ivec2 slot) {
+    return (instance.weights[slot.x] >> (8 * slot.y)) & 255;
+}
+
+bool is_stitched(Instance instance, ivec2 slot) {
+    if (slot.x == 0) return false;
+    uint weight = get(instance, slot);
+    return slot.x == 3 ? (weight & STITCHED) != 0 : weight >= ONE;
+}
+
+int line(int cells, int n) {
+    return n == 0 ? 1 : n == cells ? 2 : 2 * n == cells ? 3 : 0;
+}
+
+ivec2 slot(Instance instance, ivec2 turned) {
+    int cells = int(instance.cells);
+    int x = line(cells, turned.x);
+    int z = line(cells, turned.y);
+    ivec2 halves = ivec2(greaterThanEqual(2 * turned, ivec2(cells)));
+    if (x == 1 || x == 2) return ivec2(x, halves.y);
+    if (z == 1 || z == 2) return ivec2(z, 2 + halves.x);
+    if (x == 3) return ivec2(3, halves.y);
+    if (z == 3) return ivec2(3, 2 + halves.x);
+    return ivec2(0, halves.x + 2 * halves.y);
+}
+
+int vertex_level(Instance instance, ivec2 turned) {
+    int cells = int(instance.cells);
+    bvec2 first = lessThanEqual(2 * turned, ivec2(cells));
+    bvec2 last = greaterThanEqual(2 * turned, ivec2(cells));
+    uint touched = (first.x && first.y ? FINER : 0) | (last.x && first.y ? FINER << 8 : 0)
+        | (first.x && last.y ? FINER << 16 : 0) | (last.x && last.y ? FINER << 24 : 0);
+    return int(instance.level) - ((instance.weights.x & touched) != 0 ? 1 : 0);
+}
+
+ivec2 scaled(Instance instance, ivec2 turned) {
+    return instance.shift < 0 ? turned >> 1 : turned << instance.shift;
+}
+
+int step_at(Instance instance, ivec2 turned) {
+    return 1 << (vertex_level(instance, turned) - instance.shift);
+}
+
+ivec2 stitched_position(Instance instance, ivec2 turned) {
+    ivec2 slot = slot(instance, turned);
+    if (!is_stitched(instance, slot)) return turned;
+    int unit = step_at(instance, turned);
+    return slot.y < 2 ? ivec2(turned.x, turned.y - (turned.y & unit)) : ivec2(turned.x - (turned.x & unit), turned.y);
+}
+
 ivec2 lattice_position(Instance instance, ivec2 turned) {
-    return min(instance.origin + (turned << instance.shift), frame.last);
+    return min(instance.origin + scaled(instance, turned), frame.last);
 }
 
 vec3 relative_position(ivec2 at, float height) {
@@ -59,40 +114,46 @@ float sampled_height(Instance instance, ivec2 turned) {
     return sample_height(lattice_position(instance, turned));
 }
 
-bool on_edge(Instance instance, ivec2 turned) {
-    return any(equal(turned, ivec2(0))) || any(equal(turned, ivec2(instance.cells)));
+bool is_outer(ivec2 slot) {
+    return slot.x == 1 || slot.x == 2;
+}
+
+float unit_weight(uint weight) {
+    return float(weight) * (1.0 / float(ONE));
 }
 
 float edge_height(Instance instance, ivec2 turned) {
-    int cells = int(instance.cells);
-    bool upright = turned.x == 0 || turned.x == cells;
+    ivec2 slot = slot(instance, turned);
+    bool upright = slot.y < 2;
     int along = upright ? turned.y : turned.x;
-    int across = upright ? turned.x : turned.y;
-    int side = (upright ? 0 : 1) + (across == 0 ? 0 : 2);
-    int further = 1 - ((along >> instance.level) & 1);
-    float weight = clamp(instance.edge_morph[side] - float(further), 0.0, 1.0);
-    int step_size = 1 << (int(instance.level) + further);
+    int unit = step_at(instance, turned);
+    int further = (along & unit) == 0 ? 1 : 0;
+    int weight = clamp(int(get(instance, slot)) - further * int(ONE), 0, int(ONE));
+    int reach = unit << further;
     float sampled = sampled_height(instance, turned);
-    if (weight == 0.0 || (along & step_size) == 0) return sampled;
-    ivec2 apart = upright ? ivec2(0, step_size) : ivec2(step_size, 0);
+    if (weight == 0 || (along & reach) == 0) return sampled;
+    ivec2 apart = upright ? ivec2(0, reach) : ivec2(reach, 0);
     float target = midpoint(sampled_height(instance, turned - apart), sampled_height(instance, turned + apart));
-    return morphed_height(sampled, target, weight);
+    return morphed_height(sampled, target, unit_weight(uint(weight)));
 }
 
 float end_height(Instance instance, ivec2 turned) {
-    return on_edge(instance, turned) ? edge_height(instance, turned) : sampled_height(instance, turned);
+    return is_outer(slot(instance, turned)) ? edge_height(instance, turned) : sampled_height(instance, turned);
 }
 
 float lattice_height(Instance instance, ivec2 turned) {
-    if (on_edge(instance, turned)) return edge_height(instance, turned);
+    ivec2 slot = slot(instance, turned);
+    if (is_outer(slot)) return edge_height(instance, turned);
     float sampled = sampled_height(instance, turned);
-    int step_size = 1 << instance.level;
-    ivec2 apart = turned & step_size;
-    if (instance.morph == 0.0 || apart == ivec2(0)) return sampled;
+    uint weight = get(instance, slot) & ~FINER;
+    int unit = step_at(instance, turned);
+    ivec2 apart = turned & unit;
+    if (weight == 0 || apart == ivec2(0)) return sampled;
     if (apart.x == apart.y) {
-        ivec2 cell = (instance.origin + (turned << instance.shift)) >> (instance.shift + instance.level + 1);
+        int coarser = vertex_level(instance, turned) + 1;
+        ivec2 cell = (instance.origin + scaled(instance, turned)) >> coarser;
         if (((cell.x + cell.y) & 1) == 1) apart.y = -apart.y;
     }
     float target = midpoint(end_height(instance, turned - apart), end_height(instance, turned + apart));
-    return morphed_height(sampled, target, instance.morph);
+    return morphed_height(sampled, target, unit_weight(weight));
 }

@@ -75,7 +75,7 @@ pub struct ScenePlan {
     pub page_shift: u32,
     /// Normals filter heights with the device's sampler.
     pub filtered: bool,
-    /// Lattice vertices go over to the next coarser level.
+    /// Lattice vertices have weights: they go over to the next coarser level, or fall onto coarser sides.
     pub morph: bool,
     /// Timestamps and pipeline statistics are taken.
     pub measured: bool,
@@ -170,7 +170,13 @@ impl ScenePlan {
             sort(self.tiled, "tiling", "the field repeats", "the field does not repeat", 0),
             sort(self.page_shift > 0, "height pages", "the field exceeds one image", "one image holds the field", 0),
             sort(!self.filtered, "filtering in the shader", "the device cannot", "the device's sampler does it", 0),
-            sort(self.morph, "morphing", "the technique morphs", "no lattice vertex morphs", 0),
+            sort(
+                self.morph,
+                "vertex weights",
+                "lattice vertices morph or fall onto coarser sides",
+                "no lattice vertex moves",
+                0,
+            ),
             sort(self.fog, "fog", "asked for", "density 0", 0),
             sort(overlay, "overlay", "asked for", "no picture is laid over", 0),
             sort(self.wireframe, "wireframe", "asked for", "faces are filled", 0),

@@ -250,32 +250,18 @@ impl View {
     }
 
     /// The largest vertical displacement, metres, that a surface inside `bounds` may have under the
-    /// tolerance and metric of this view.
-    ///
-    /// Certified: a point at view depth `z` and horizontal distance `r` from the eye, displaced vertically
-    /// by δ, moves on the screen by exactly `f·δ·|…|/(z·z′)` with `|…| ≤ r` and `z′ ≥ z − δ·|u|`, where `u`
-    /// is the component of the world's up vector along the view axis. Visible points of the box have
-    /// `z ≥ max(near, nearest depth, d/k)` and `r ≤ min(k·z, farthest horizontal distance)`, where `k` is
-    /// the length of the ray through a picture corner at unit depth. This tightens and makes safe
-    /// Judnich & Ling's eq. 1, which is up to k² too small off the axis.
+    /// tolerance and metric of this view: see [`Allowance::error`].
     pub fn allowed_error(&self, bounds: &Aabb) -> f64 {
-        let focal = self.focal_px();
-        let px = self.tolerance.px;
-        let distance = bounds.distance(self.eye).max(self.near);
-        let forward = self.forward();
-        match (self.lens, self.tolerance.metric) {
-            (Lens::Orthographic { .. }, Metric::Paper) => px / focal,
-            (Lens::Orthographic { .. }, Metric::Certified) => {
-                px / (focal * (1.0 - forward.y * forward.y).max(0.0).sqrt()).max(f64::MIN_POSITIVE)
-            }
-            (Lens::Perspective { .. }, Metric::Paper) => px * distance / focal,
-            (Lens::Perspective { .. }, Metric::Certified) => {
-                let corner = self.half_extent().length().hypot(1.0);
-                let nearest = -bounds.support(-forward) - forward.dot(self.eye);
-                let depth = self.near.max(nearest).max(distance / corner);
-                let aside = (bounds.farthest_horizontal(self.eye) / depth).min(corner);
-                px * depth / (focal * aside + px * forward.y.abs()).max(f64::MIN_POSITIVE)
-            }
+        self.allowance().error(bounds)
+    }
+
+    /// What [`View::allowed_error`] is worked out with, for many boxes.
+    pub fn allowance(&self) -> Allowance {
+        Allowance {
+            view: *self,
+            forward: self.forward(),
+            focal_px: self.focal_px(),
+            corner: self.half_extent().length().hypot(1.0),
         }
     }
 
@@ -285,6 +271,46 @@ impl View {
         match (self.project(drawn), self.project(truth)) {
             (Some(a), Some(b)) => a.pixel.distance(b.pixel),
             _ => f64::INFINITY,
+        }
+    }
+}
+
+/// A view's tolerance made ready for many boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowance {
+    view: View,
+    forward: DVec3,
+    focal_px: f64,
+    /// Length of the ray through a picture corner at unit depth.
+    corner: f64,
+}
+
+impl Allowance {
+    /// The largest vertical displacement, metres, that a surface inside `bounds` may have under the
+    /// tolerance and metric of this view.
+    ///
+    /// Certified: a point at view depth `z` and horizontal distance `r` from the eye, displaced vertically
+    /// by δ, moves on the screen by exactly `f·δ·|…|/(z·z′)` with `|…| ≤ r` and `z′ ≥ z − δ·|u|`, where `u`
+    /// is the component of the world's up vector along the view axis. Visible points of the box have
+    /// `z ≥ max(near, nearest depth, d/k)` and `r ≤ min(k·z, farthest horizontal distance)`, where `k` is
+    /// the length of the ray through a picture corner at unit depth. This tightens and makes safe
+    /// Judnich & Ling's eq. 1, which is up to k² too small off the axis.
+    pub fn error(&self, bounds: &Aabb) -> f64 {
+        let View { eye, lens, near, tolerance, .. } = self.view;
+        let (focal, px, forward) = (self.focal_px, tolerance.px, self.forward);
+        match (lens, tolerance.metric) {
+            (Lens::Orthographic { .. }, Metric::Paper) => px / focal,
+            (Lens::Orthographic { .. }, Metric::Certified) => {
+                px / (focal * (1.0 - forward.y * forward.y).max(0.0).sqrt()).max(f64::MIN_POSITIVE)
+            }
+            (Lens::Perspective { .. }, Metric::Paper) => px * bounds.distance(eye).max(near) / focal,
+            (Lens::Perspective { .. }, Metric::Certified) => {
+                let distance = bounds.distance(eye).max(near);
+                let nearest = -bounds.support(-forward) - forward.dot(eye);
+                let depth = near.max(nearest).max(distance / self.corner);
+                let aside = (bounds.farthest_horizontal(eye) / depth).min(self.corner);
+                px * depth / (focal * aside + px * forward.y.abs()).max(f64::MIN_POSITIVE)
+            }
         }
     }
 }

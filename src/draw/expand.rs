@@ -1,7 +1,7 @@
 //! From a draw list to its triangles, on the CPU: what the device draws, without a device.
 
 use super::layout::Frame;
-use super::place::{lattice_height, lattice_position, morphed_height, turned_position};
+use super::place::{lattice_height, lattice_position, morphed_height, stitched_position, turned_position};
 use super::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
@@ -92,6 +92,7 @@ fn corner(field: &Field, frame: &Frame, geometry: &Geometry, source: Source, pla
     match source {
         Source::Lattice => {
             let turned = turned_position(placed, geometry.lattice[index as usize].position);
+            let turned = stitched_position(placed, turned);
             let [x, z] = lattice_position(frame, placed, turned);
             Corner { x, z, y: lattice_height(field, frame, placed, turned) }
         }

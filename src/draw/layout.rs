@@ -11,6 +11,7 @@ pub mod glsl {
     pub type int = i32;
     pub type float = f32;
     pub type uvec2 = [u32; 2];
+    pub type uvec4 = [u32; 4];
     pub type ivec2 = [i32; 2];
     pub type vec2 = [f32; 2];
     pub type vec3 = [f32; 3];
@@ -84,19 +85,16 @@ shared! {
         origin: ivec2,
         /// Mesh units per side: a turn maps (x, z) to (cells − z, x).
         cells: uint,
-        /// Samples per mesh unit, as a power of two.
-        shift: uint,
+        /// Samples per mesh unit, as a power of two; −1: two units a sample, and odd positions do not occur.
+        shift: int,
         /// Quarter turns about the mesh's centre, 0–3.
         turns: uint,
         /// Level of detail, 0 the finest: for morphing, colouring and counting.
         level: uint,
         /// Which batch drew it: for colouring.
         batch: uint,
-        /// How far the inner vertices have gone to the next coarser level, 0 to 1.
-        morph: float,
-        /// The same for those of the sides x = 0, z = 0, x = cells and z = cells after the turn, 0 to 2:
-        /// past 1 the side has left the next coarser level for the one after it.
-        edge_morph: vec4,
+        /// How far vertices have gone to coarser levels: sixteen bytes, see `draw::weights`.
+        weights: uvec4,
     }
 
     /// A vertex of a lattice mesh: its height is found in the height texture.

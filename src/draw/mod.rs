@@ -3,6 +3,7 @@
 pub mod expand;
 pub mod layout;
 pub mod place;
+pub mod weights;
 
 use std::ops::Range;
 

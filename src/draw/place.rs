@@ -1,6 +1,7 @@
 //! Where lattice vertices lie: the CPU twin of `shaders/position.glsl`, function by function.
 
 use super::layout::{Frame, Instance};
+use super::weights::{FINER, ONE, Slot, get, is_stitched, slot, vertex_level};
 use crate::height::{Field, Samples};
 use crate::view::View;
 
@@ -45,58 +46,83 @@ pub fn turned_position(instance: &Instance, [x, z]: [i32; 2]) -> [i32; 2] {
     }
 }
 
+/// Samples of a length in mesh units.
+fn scaled(instance: &Instance, length: i32) -> i32 {
+    if instance.shift < 0 { length >> 1 } else { length << instance.shift }
+}
+
+/// Mesh units between neighbouring vertices at a turned one.
+fn step_at(instance: &Instance, turned: [i32; 2]) -> i32 {
+    1 << (vertex_level(instance, turned) - instance.shift)
+}
+
+/// Where a turned mesh vertex comes to lie in its mesh: on a line that meets a coarser mesh, an odd vertex falls
+/// onto the even one before it.
+pub fn stitched_position(instance: &Instance, turned: [i32; 2]) -> [i32; 2] {
+    let slot = slot(instance, turned);
+    if !is_stitched(instance, slot) {
+        return turned;
+    }
+    let step = step_at(instance, turned);
+    let [x, z] = turned;
+    if slot.1 < 2 { [x, z - (z & step)] } else { [x - (x & step), z] }
+}
+
 /// Lattice position of a turned mesh vertex: scaled, moved, and held inside the field, so that the part of a
 /// mesh that sticks out collapses onto the field's edge.
 pub fn lattice_position(frame: &Frame, instance: &Instance, turned: [i32; 2]) -> [i32; 2] {
-    [0, 1].map(|k| (instance.origin[k] + (turned[k] << instance.shift)).min(frame.last[k]))
+    [0, 1].map(|k| (instance.origin[k] + scaled(instance, turned[k])).min(frame.last[k]))
 }
 
-/// Height of a turned mesh vertex. One inside the mesh that the next coarser level lacks goes to the midpoint of
-/// the edge of that level on which it lies, as far as the instance's morph says.
+/// Height of a stitched mesh vertex. One that the next coarser level lacks goes to the midpoint of the edge of that
+/// level on which it lies, as far as its weight says.
 pub fn lattice_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
-    if on_edge(instance, turned) {
+    let slot = slot(instance, turned);
+    if is_outer(slot) {
         return edge_height(field, frame, instance, turned);
     }
     let sampled = sampled_height(field, frame, instance, turned);
-    let step = 1 << instance.level;
+    let weight = get(instance, slot) & !FINER;
+    let step = step_at(instance, turned);
     let mut apart = turned.map(|n| n & step);
-    if instance.morph == 0.0 || apart == [0, 0] {
+    if weight == 0 || apart == [0, 0] {
         return sampled;
     }
     if apart[0] == apart[1] {
         // The diagonal of the coarser cell: it turns with the parity of the cell's place in the whole field.
-        let cell =
-            |k: usize| (instance.origin[k] + (turned[k] << instance.shift)) >> (instance.shift + instance.level + 1);
+        let coarser = vertex_level(instance, turned) + 1;
+        let cell = |k: usize| (instance.origin[k] + scaled(instance, turned[k])) >> coarser;
         if (cell(0) + cell(1)) & 1 == 1 {
             apart[1] = -apart[1];
         }
     }
     let end = |sign: i32| end_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
-    morphed_height(sampled, midpoint(end(-1), end(1)), instance.morph)
+    morphed_height(sampled, midpoint(end(-1), end(1)), unit_weight(weight))
 }
 
 /// Height of the end of a coarser edge: inside the mesh it stays, on a side it may be on its own way.
 fn end_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
-    let height = if on_edge(instance, turned) { edge_height } else { sampled_height };
+    let height = if is_outer(slot(instance, turned)) { edge_height } else { sampled_height };
     height(field, frame, instance, turned)
 }
 
-/// Height of a turned vertex on a side of the mesh. It goes to the midpoint of its neighbours along the side,
+/// Height of a stitched vertex on a side of the mesh. It goes to the midpoint of its neighbours along the side,
 /// so that both meshes of a side agree on it. A mesh's corners stay: no level within reach lacks them.
 fn edge_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
-    let upright = turned[0] == 0 || turned[0] == instance.cells as i32;
-    let (along, across) = if upright { (turned[1], turned[0]) } else { (turned[0], turned[1]) };
-    let side = usize::from(!upright) + if across == 0 { 0 } else { 2 };
-    let further = 1 - ((along >> instance.level) & 1);
-    let weight = (instance.edge_morph[side] - further as f32).clamp(0.0, 1.0);
-    let step = 1 << (instance.level as i32 + further);
+    let slot = slot(instance, turned);
+    let upright = slot.1 < 2;
+    let along = if upright { turned[1] } else { turned[0] };
+    let step = step_at(instance, turned);
+    let further = i32::from(along & step == 0);
+    let weight = (get(instance, slot) as i32 - further * ONE as i32).clamp(0, ONE as i32);
+    let reach = step << further;
     let sampled = sampled_height(field, frame, instance, turned);
-    if weight == 0.0 || along & step == 0 {
+    if weight == 0 || along & reach == 0 {
         return sampled;
     }
-    let apart = if upright { [0, step] } else { [step, 0] };
+    let apart = if upright { [0, reach] } else { [reach, 0] };
     let end = |sign: i32| sampled_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
-    morphed_height(sampled, midpoint(end(-1), end(1)), weight)
+    morphed_height(sampled, midpoint(end(-1), end(1)), unit_weight(weight as u32))
 }
 
 fn sampled_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> f32 {
@@ -104,8 +130,12 @@ fn sampled_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i3
     field.height(x as u32, z as u32)
 }
 
-fn on_edge(instance: &Instance, turned: [i32; 2]) -> bool {
-    turned.iter().any(|&n| n == 0 || n == instance.cells as i32)
+fn is_outer((word, _): Slot) -> bool {
+    word == 1 || word == 2
+}
+
+fn unit_weight(weight: u32) -> f32 {
+    weight as f32 * (1.0 / ONE as f32)
 }
 
 fn midpoint(a: f32, b: f32) -> f32 {

@@ -234,7 +234,7 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
     const PAIR: vk::Format = vk::Format::R32G32_SINT;
     const UINT: vk::Format = vk::Format::R32_UINT;
     const FLOAT: vk::Format = vk::Format::R32_SFLOAT;
-    const SIDES: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+    const WEIGHTS: vk::Format = vk::Format::R32G32B32A32_UINT;
     let (stride, vertex) = match source {
         Source::Lattice => (size_of::<LatticeVertex>(), vec![(0, PAIR, offset_of!(LatticeVertex, position))]),
         Source::Resident | Source::Streamed => (
@@ -250,15 +250,14 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
     let mut instance = vec![
         (8, PAIR, offset_of!(Instance, origin)),
         (9, UINT, offset_of!(Instance, cells)),
-        (10, UINT, offset_of!(Instance, shift)),
+        (10, vk::Format::R32_SINT, offset_of!(Instance, shift)),
         (11, UINT, offset_of!(Instance, turns)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
     ];
     // Explicit vertices have weights of their own.
     if source == Source::Lattice {
-        instance.push((14, FLOAT, offset_of!(Instance, morph)));
-        instance.push((15, SIDES, offset_of!(Instance, edge_morph)));
+        instance.push((14, WEIGHTS, offset_of!(Instance, weights)));
     }
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (stride as u32, attributes)

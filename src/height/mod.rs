@@ -3,12 +3,14 @@
 mod archive;
 mod asc;
 mod bil;
+pub mod bounds;
 pub mod demo;
 mod envi;
 mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
+pub mod levels;
 mod load;
 mod png;
 mod raster;

@@ -3,6 +3,7 @@
 //! Pure computation: no device, no file, no clock. Rooms never use each other.
 
 pub mod brute_force;
+pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
 
@@ -27,7 +28,8 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
-    /// Whether its lattice vertices morph ([`Instance::morph`](crate::draw::Instance)).
+    /// Whether its instances have weights ([`weights`](crate::draw::weights)): its lattice vertices morph, or fall
+    /// onto coarser sides.
     fn morphs(&self) -> bool {
         false
     }
@@ -65,7 +67,7 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY];
+pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

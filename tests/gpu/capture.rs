@@ -45,7 +45,14 @@ fn as_drawn_is_as_expanded_to_the_bit() {
     on_device(|gpu| {
         let land = Arc::new(synth::synth(synth::Kind::Fractal, [513, 400], 9));
         for field in [mountains(), as_f32(&mountains()), land] {
-            let rooms = [("brute-force", &[][..]), ("geomipmap", &[]), ("geomipmap", &["block=17", "morph=on"])];
+            let rooms = [
+                ("brute-force", &[][..]),
+                ("geomipmap", &[]),
+                ("geomipmap", &["block=17", "morph=on"]),
+                ("clusters", &["block=8"]),
+                ("clusters", &["block=8", "morph=on"]),
+                ("clusters:draw-per-block", &["block=16", "morph=on"]),
+            ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());
             }

@@ -3,32 +3,46 @@
 use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame};
-use cuesta::draw::place::{lattice_height, lattice_position, morphed_height, relative_position, turned_position};
+use cuesta::draw::place::{
+    lattice_height, lattice_position, morphed_height, relative_position, stitched_position, turned_position,
+};
 use cuesta::draw::{DrawList, Instance};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
 use cuesta::height::Field;
 use cuesta::plan::{Look, ScenePlan};
+use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with made-up morph weights if they are to morph,
-/// and explicit vertices with weights of their own.
-fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> Vec<Query> {
-    let mut geomipmap = technique(field, "geomipmap", &["block=17"]);
+/// Every vertex of every third instance that a technique draws, with made-up weights if they are to morph.
+fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], morph: bool) -> Vec<Query> {
+    let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
-    geomipmap.select(frame_view, &mut list);
-    let lattice = &geomipmap.resident().lattice;
-    let lattice_queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        let weight = |by: f32| f32::from(k) * by % 1.0;
-        let edge_morph = [2.0 * weight(0.61), weight(0.27), 2.0 * weight(0.83), 1.0 + weight(0.44)];
-        let morphing = Instance { morph: weight(0.37), edge_morph, ..*instance };
+    technique.select(view, &mut list);
+    let lattice = &technique.resident().lattice;
+    let queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
+        let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
+        let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
+        let weights = [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
+        let morphing = Instance { weights, ..*instance };
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
             instance: if morph { morphing } else { *instance },
             explicit_height: 0,
         })
     });
+    queries.collect()
+}
+
+/// Lattice vertices of two techniques, and explicit vertices with weights of their own.
+fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
+    let mut queries = lattice_queries(field, view, "geomipmap", &["block=17"], morph);
+    // Without weights the program does not know of half samples.
+    if morph {
+        queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on"], morph));
+    }
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
             position: [(k % 37) as i32, (k / 37) as i32],
@@ -36,15 +50,17 @@ fn queries(field: &Arc<Field>, frame_view: &cuesta::view::View, morph: bool) -> 
             target: 1200.0 + 1.7 * k as f32,
             morph: k as f32 / 1999.0,
         },
-        instance: Instance { origin: [5, 3], cells: 64, shift: k % 2, turns: k % 4, ..Instance::default() },
+        instance: Instance { origin: [5, 3], cells: 64, shift: (k % 2) as i32, turns: k % 4, ..Instance::default() },
         explicit_height: 1,
     });
-    lattice_queries.chain(explicit).collect()
+    queries.extend(explicit);
+    queries
 }
 
 fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
     let vertex = &query.vertex;
     let turned = turned_position(&query.instance, vertex.position);
+    let turned = if query.explicit_height == 0 { stitched_position(&query.instance, turned) } else { turned };
     let height = match query.explicit_height {
         0 => lattice_height(field, frame, &query.instance, turned),
         _ => morphed_height(vertex.height, vertex.target, vertex.morph),

@@ -1,5 +1,6 @@
 //! What single techniques promise beyond the laws of `conformance`.
 
+mod clusters;
 mod morph;
 
 use std::sync::Arc;
@@ -11,12 +12,13 @@ use cuesta::height::{Field, surface};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::view::View;
 
-/// A technique with settings given as `key=value`.
+/// A technique, or a variant as `technique:variant`, with settings given as `key=value`.
 fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
+    let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
     let entry = lod::find(name).expect("in the table");
     let pair = |s: &&str| s.split_once('=').map(|(k, v)| (k.to_string(), v.to_string())).expect("key=value");
     let settings: Vec<_> = settings.iter().map(pair).collect();
-    (entry.build)(Arc::clone(field), &Settings::new(entry, None, &settings).expect("the table's own values"))
+    (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).expect("the table's own values"))
 }
 
 /// The drawn height above every sample; not a number where nothing is drawn.

@@ -1,7 +1,8 @@
-//! Geomipmap's morphing: it ends where the next level begins, and nothing jumps on the way.
+//! Morphing: it ends where the next level begins, and nothing jumps on the way.
 
 use std::sync::Arc;
 
+use cuesta::draw::weights::{self, ONE};
 use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use cuesta::height::{Field, synth};
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
@@ -32,7 +33,9 @@ fn view(eye: DVec3, target: DVec3, px: f64) -> View {
 fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph: [f32; 4]) -> DrawList {
     let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
     let turns = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
-    let instance = Instance { origin, cells: 16, turns, level, morph, edge_morph, ..Instance::default() };
+    let weight = |w: f32| (w * ONE as f32) as u32;
+    let weights = weights::uniform(weight(morph), edge_morph.map(weight));
+    let instance = Instance { origin, cells: 16, turns, level, weights, ..Instance::default() };
     let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
     let draws = ranges.map(|indices| Draw {
         source: Source::Lattice,
@@ -68,8 +71,8 @@ fn at_its_end_a_morph_is_the_next_level() {
 }
 
 /// The largest displacement on the screen, pixels, by a change of levels alone, along a slow way to the land.
-fn largest_jump(field: &Arc<Field>, settings: &[&str]) -> f64 {
-    let mut technique = technique(field, "geomipmap", settings);
+fn largest_jump(field: &Arc<Field>, name: &str, settings: &[&str]) -> f64 {
+    let mut technique = technique(field, name, settings);
     let target = field.world_at(128.0, 128.0, 500.0);
     let mut frame = |k: u32| {
         // Half a per cent nearer each time.
@@ -102,10 +105,20 @@ fn on_a_slow_way_nothing_jumps() {
     let field = land();
     for distance in ["error", "linear", "exponential"] {
         let settings = ["block=17", "base=60", &format!("distance={distance}"), "morph=off"];
-        let off = largest_jump(&field, &settings);
-        let on = largest_jump(&field, &[&settings[..3], &["morph=on"]].concat());
+        let off = largest_jump(&field, "geomipmap", &settings);
+        let on = largest_jump(&field, "geomipmap", &[&settings[..3], &["morph=on"]].concat());
         println!("{distance}: {off:.3} px at once, {on:.3} px morphing");
         let limit = if distance == "error" { JUMP_PX } else { off / 4.0 };
         assert!(on < limit && limit < off, "{distance}: {on} px morphing, {off} px at once");
+    }
+}
+
+#[test]
+fn clusters_do_not_jump_either() {
+    let field = land();
+    for block in ["block=8", "block=16"] {
+        let [off, on] = ["morph=off", "morph=on"].map(|morph| largest_jump(&field, "clusters", &[block, morph]));
+        println!("clusters, {block}: {off:.3} px at once, {on:.3} px morphing");
+        assert!(on < JUMP_PX && JUMP_PX < off, "{block}: {on} px morphing, {off} px at once");
     }
 }

@@ -14,6 +14,7 @@ use super::mesh;
 use crate::draw::Instance;
 use crate::draw::layout::Frame;
 use crate::draw::place::{lattice_height, lattice_position, turned_position};
+use crate::draw::weights::{self, ONE};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle};
 
@@ -24,8 +25,8 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Triangles of a block at a level and at whole morph weights.
 pub struct Shape {
     level: u32,
-    morph: f32,
-    edge_morph: [f32; 4],
+    morph: u32,
+    edge_morph: [u32; 4],
     triangles: Vec<[[i32; 2]; 3]>,
 }
 
@@ -33,7 +34,7 @@ impl Shape {
     /// All that a block may draw at a level, and on the way to it from the one before if it morphs, as far as it
     /// may be off the samples.
     pub fn up_to(cells: i32, level: u32, morph: bool) -> Vec<Shape> {
-        let still = Shape { level, morph: 0.0, edge_morph: [0.0; 4], triangles: pattern(cells, level) };
+        let still = Shape { level, morph: 0, edge_morph: [0; 4], triangles: pattern(cells, level) };
         let way = if morph && level > 0 { Self::on_the_way(cells, level - 1) } else { Vec::new() };
         std::iter::once(still).chain(way).collect()
     }
@@ -41,13 +42,13 @@ impl Shape {
     /// The new corners of the module's text from `level` to the next.
     fn on_the_way(cells: i32, level: u32) -> Vec<Shape> {
         let n = cells >> level;
-        let shape = |(morph, side): (f32, f32)| {
-            let mask = if side < 1.0 { 0 } else { 15 };
+        let shape = |(morph, side): (u32, u32)| {
+            let mask = if side < ONE { 0 } else { 15 };
             let triangles = [mesh::border(n, mask), mesh::inner_border(n)].concat();
             Shape { level, morph, edge_morph: [side; 4], triangles }
         };
         // No level is two levels coarser than that of two cells.
-        let corners = [(1.0, 0.0), (0.0, 2.0)].into_iter().filter(|(_, side)| *side < 2.0 || n > 2);
+        let corners = [(ONE, 0), (0, 2 * ONE)].into_iter().filter(|(_, side)| *side < 2 * ONE || n > 2);
         corners.map(shape).collect()
     }
 }
@@ -122,7 +123,7 @@ impl<'a> Block<'a> {
 
     fn error(&self, shape: &Shape) -> f32 {
         // The inside of a block that sticks out does not morph.
-        if shape.morph > 0.0 && self.is_partial() {
+        if shape.morph > 0 && self.is_partial() {
             return 0.0;
         }
         let instance = Instance {
@@ -130,8 +131,7 @@ impl<'a> Block<'a> {
             cells: self.cells as u32,
             turns: coarsest_turn(self.at, self.cells >> shape.level),
             level: shape.level,
-            morph: shape.morph,
-            edge_morph: shape.edge_morph,
+            weights: weights::uniform(shape.morph, shape.edge_morph),
             ..Instance::default()
         };
         shape.triangles.iter().map(|t| self.deviation(&instance, t)).fold(0.0, f32::max)
@@ -168,8 +168,8 @@ mod tests {
     }
 
     /// ε of everything a block draws at given weights.
-    fn drawn_error(block: &Block, level: u32, morph: f32, edge_morph: [f32; 4]) -> f32 {
-        let (n, mask) = (CELLS >> level, (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum());
+    fn drawn_error(block: &Block, level: u32, morph: u32, edge_morph: [u32; 4]) -> f32 {
+        let (n, mask) = (CELLS >> level, (0..4).filter(|&k| edge_morph[k] >= ONE).map(|k| 1 << k).sum());
         let triangles = [mesh::border(n, mask), mesh::centre(n)].concat();
         block.error(&Shape { level, morph, edge_morph, triangles })
     }
@@ -190,10 +190,13 @@ mod tests {
                 |morph| block.errors(&(0..5).map(|level| Shape::up_to(CELLS, level, morph)).collect::<Vec<_>>());
             let (errors, still) = (errors(true), errors(false));
             for (level, draw) in (0..4).flat_map(|level| (0..20).map(move |draw| (level, draw))) {
-                let furthest = if level == 3 { 1.0 } else { 2.0 };
+                let furthest = if level == 3 { 1 } else { 2 };
                 // Half of them at the corners.
-                let mut weight = |most: f32| if draw < 10 { most * random() } else { (most * random()).round() };
-                let (v, e) = (weight(1.0), [0; 4].map(|_| weight(furthest)));
+                let mut weight = |most: u32| {
+                    let whole = most as f32 * random();
+                    (if draw < 10 { whole * ONE as f32 } else { whole.round() * ONE as f32 }) as u32
+                };
+                let (v, e) = (weight(1), [0; 4].map(|_| weight(furthest)));
                 let (error, bound) = (drawn_error(&block, level, v, e), errors[level as usize + 1]);
                 assert!(error <= bound, "level {level}, {v} inside, sides {e:?}: {error} m of {bound} m");
                 beyond_still += usize::from(error > still[level as usize + 1]);

@@ -28,7 +28,7 @@ use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology, weights};
 use crate::height::Field;
 use crate::view::View;
 
@@ -144,15 +144,15 @@ impl GeoMipMap {
     /// blocks: it is where either of them goes over, and the other one's bound covers it, being at most a level
     /// behind. Where blocks stick out of the field midpoints are none, so the inside of such a block and a side
     /// between two of them stay.
-    fn weights(&self, block: usize) -> (f32, [f32; 4]) {
+    fn weights(&self, block: usize) -> [u32; 4] {
         let base = self.level(block) * ONE;
         let partial = |block| self.blocks.is_partial(block);
         let weight = |level: u32, stays: bool| {
             let level = if stays { level / ONE * ONE } else { level };
-            (level - base) as f32 / ONE as f32
+            (level - base) / (ONE / weights::ONE)
         };
         let edge = |other: usize| weight(self.levels[block].max(self.levels[other]), partial(block) && partial(other));
-        (weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
+        weights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
     }
 
     fn instance(&self, block: usize) -> Instance {
@@ -160,7 +160,6 @@ impl GeoMipMap {
         let level = self.level(block);
         let (_, turns) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
-        let (morph, edge_morph) = if self.morph { self.weights(block) } else { Default::default() };
         Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
@@ -168,8 +167,7 @@ impl GeoMipMap {
             turns: turns.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
             level,
             batch: 0,
-            morph,
-            edge_morph,
+            weights: if self.morph { self.weights(block) } else { [0; 4] },
         }
     }
 

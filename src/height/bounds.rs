@@ -1,0 +1,301 @@
+//! What is known of the squares of a quadtree over a field before any view: the range of their heights, and how
+//! far their surface is from the samples.
+//!
+//! A square of level ℓ is `cells` × `cells` cells with vertices on every 2^ℓ-th sample. Only the stored samples of a
+//! tiled field are looked at, however often it repeats. Where its period is a multiple of a square's side, or the
+//! other way round, all squares that look the same are measured once. Otherwise the vertices of a square may lie
+//! anywhere, and [`levels::detail`] bounds its error: greater, but true for all.
+
+use rayon::prelude::*;
+
+use super::Field;
+use super::levels::{self, Patch};
+use super::surface;
+
+/// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
+/// the two steps of `draw::place::lattice_height`.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// What is to be measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Measure {
+    /// Cells along a side of a square at every level: a power of two, at least 8.
+    pub cells: u32,
+    /// A square's error is at least this many times those of the squares in it (1: saturated).
+    pub growth: f32,
+    /// Whether errors are measured at all: otherwise they are 0.
+    pub errors: bool,
+    /// Whether the squares in it go over into a square gradually: then that must be within its error too.
+    pub morph: bool,
+}
+
+/// One square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Square {
+    /// The largest distance, metres, of its surface from the samples, holes excepted: with any of its sides one
+    /// level coarser too, and at least `growth` times that of the squares in it.
+    pub error: f32,
+    /// Lowest and highest sample, metres; the lowest is above the highest if there is no land.
+    pub range: [f32; 2],
+}
+
+/// All squares of a field.
+pub struct Bounds {
+    measure: Measure,
+    last: [u32; 2],
+    period: [Option<u32>; 2],
+    levels: Vec<Level>,
+}
+
+/// The squares of one level: those of a tiled axis begin at every multiple of the side within the period.
+struct Level {
+    side: u32,
+    count: [u32; 2],
+    squares: Vec<Square>,
+}
+
+impl Square {
+    const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
+
+    /// Whether any triangle of the samples' own surface has data.
+    pub fn has_land(&self) -> bool {
+        self.range[0] <= self.range[1]
+    }
+
+    fn union(self, other: Square) -> Square {
+        let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
+        Square { error: self.error.max(other.error), range }
+    }
+}
+
+impl Bounds {
+    /// Measures a field, in parallel.
+    pub fn new(field: &Field, measure: Measure) -> Self {
+        let (stored, size) = (field.stored(), field.size());
+        let period = [0, 1].map(|k| (size[k] > stored[k]).then_some(stored[k]));
+        let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new() };
+        let longest = size[0].max(size[1]) - 1;
+        let mut level = 0;
+        loop {
+            bounds.add_level(field, level);
+            if measure.cells << level >= longest {
+                return bounds;
+            }
+            level += 1;
+        }
+    }
+
+    /// How many levels there are; one square of the last holds the field.
+    pub fn levels(&self) -> u32 {
+        self.levels.len() as u32
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| size_of_val(level.squares.as_slice())).sum()
+    }
+
+    /// Samples along a side of the squares of a level.
+    pub fn side(&self, level: u32) -> u32 {
+        self.measure.cells << level
+    }
+
+    /// Whether a square sticks out of the field.
+    pub fn is_partial(&self, level: u32, at: [u32; 2]) -> bool {
+        (0..2).any(|k| (at[k] + 1) * self.side(level) > self.last[k])
+    }
+
+    /// The square at a place among those of its level.
+    pub fn square(&self, level: u32, at: [u32; 2]) -> Square {
+        if self.period == [None; 2] {
+            let held = &self.levels[level as usize];
+            return held.squares[(at[1] * held.count[0] + at[0]) as usize];
+        }
+        let side = self.side(level);
+        let square = self.covering(level, at.map(|n| n * side), [side; 2]);
+        // The end of a tiled field cuts squares that are measured whole.
+        let cut = self.measure.errors && square.has_land() && self.is_partial(level, at);
+        if cut { Square { error: square.error.max(square.range[1] - square.range[0]), ..square } } else { square }
+    }
+
+    /// What holds for all squares of a level that a rectangle of samples touches.
+    fn covering(&self, level: u32, first: [u32; 2], side: [u32; 2]) -> Square {
+        let held = &self.levels[level as usize];
+        let [(x, x_count), (z, z_count)] = [0, 1].map(|k| held.touched(k, self.period[k], first[k], side[k]));
+        let mut all = Square::NOTHING;
+        for j in (z..z + z_count).map(|j| j % held.count[1]) {
+            for i in (x..x + x_count).map(|i| i % held.count[0]) {
+                all = all.union(held.squares[(j * held.count[0] + i) as usize]);
+            }
+        }
+        all
+    }
+
+    fn add_level(&mut self, field: &Field, level: u32) {
+        let side = self.side(level);
+        let extent = [0, 1].map(|k| self.period[k].unwrap_or(self.last[k]));
+        let count = extent.map(|n| n.div_ceil(side));
+        let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
+            let first = [k % count[0], k / count[0]].map(|n| n * side);
+            self.measured(field, level, first)
+        });
+        let squares = squares.collect();
+        self.levels.push(Level { side, count, squares });
+    }
+
+    fn measured(&self, field: &Field, level: u32, first: [u32; 2]) -> Square {
+        let side = self.side(level);
+        // No further than once around, or to the end.
+        let reach = [0, 1].map(|k| self.period[k].map_or((self.last[k] - first[k]).min(side), |n| n.min(side)));
+        let children = match level {
+            0 => Square { error: 0.0, range: range_of_land(field, first, reach) },
+            _ => self.covering(level - 1, first, reach),
+        };
+        if !children.has_land() {
+            return Square::NOTHING;
+        }
+        let [low, high] = children.range;
+        let aligned = (0..2).all(|k| self.period[k].is_none_or(|n| is_aligned(n, level, side)));
+        let own = if !self.measure.errors {
+            0.0
+        } else if aligned {
+            self.error(field, level, first)
+        } else {
+            children.error + levels::detail(field, first, reach, level + 1)
+        };
+        let rounding = if self.measure.morph && own > 0.0 { low.abs().max(high.abs()) * ROUNDING } else { 0.0 };
+        Square { error: (own + rounding).max(children.error * self.measure.growth), range: children.range }
+    }
+
+    /// The error of a square whose vertices' places are known.
+    fn error(&self, field: &Field, level: u32, first: [u32; 2]) -> f32 {
+        let last = [0, 1].map(|k| if self.period[k].is_some() { u32::MAX } else { self.last[k] });
+        // What sticks out of the field collapses; what repeats is looked at once.
+        let length = self.period.map(|period| period.unwrap_or(u32::MAX).min(self.side(level)));
+        let patch = |level: u32| Patch { field, first, cells: length.map(|n| n >> level), level, last };
+        let own = if level == 0 { 0.0 } else { patch(level).deviation() };
+        // Squares in it that go over into it have sides two levels coarser than themselves.
+        let way = if self.measure.morph && level > 0 { patch(level - 1).stitched_deviation(2) } else { 0.0 };
+        own.max(way).max(patch(level).stitched_deviation(1))
+    }
+}
+
+impl Level {
+    /// Which squares along an axis a length of samples touches: the first and how many, modulo their count.
+    fn touched(&self, axis: usize, period: Option<u32>, first: u32, length: u32) -> (u32, u32) {
+        let (side, count) = (self.side, self.count[axis]);
+        let Some(period) = period else {
+            let last = ((first + length - 1) / side).min(count - 1);
+            return (first / side, last + 1 - first / side);
+        };
+        let (at, end) = (first % period, first % period + length - 1);
+        if length >= period {
+            (0, count)
+        } else if end < period {
+            (at / side, end / side + 1 - at / side)
+        } else {
+            (at / side, (count - at / side + (end - period) / side + 1).min(count))
+        }
+    }
+}
+
+/// Whether the squares of a level lie on a tiled axis of this period so that each looks like one of the first.
+fn is_aligned(period: u32, level: u32, side: u32) -> bool {
+    period.is_multiple_of(side) || side.is_multiple_of(period) && period.is_multiple_of(4 << level)
+}
+
+fn range_of_land(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2] {
+    let last = [0, 1].map(|k| first[k] + reach[k]);
+    if !surface::has_land(field, first.map(|n| n as i32), last.map(|n| n as i32)) {
+        return Square::NOTHING.range;
+    }
+    let heights = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i, j)));
+    heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::surface::{Corner, deviation};
+    use crate::height::{Holes, Samples, rtin};
+
+    const MEASURE: Measure = Measure { cells: 8, growth: 1.0, errors: true, morph: false };
+
+    fn rough(size: [u32; 2], seed: u32) -> Field {
+        let count = (size[0] * size[1]) as usize;
+        let mut state = seed;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let heights = (0..count as u32).map(|k| {
+            let wave = ((k % size[0]) as f32 / 5.0).sin() + ((k / size[0]) as f32 / 9.0).cos();
+            20.0 * wave + 3.0 * random()
+        });
+        Field::new(Samples::F32(heights.collect()), size, [1.0; 2], Holes::none(count))
+    }
+
+    /// The same land with every sample of every tile held.
+    fn held(field: &Field) -> Field {
+        let [w, h] = field.size();
+        let heights = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
+        Field::new(Samples::F32(heights), [w, h], field.spacing, Holes::none((w * h) as usize))
+    }
+
+    fn squares(bounds: &Bounds) -> Vec<(u32, [u32; 2])> {
+        let count = |level: u32, k: usize| bounds.last[k].div_ceil(bounds.side(level));
+        let of = |level: u32| {
+            let [w, h] = [count(level, 0), count(level, 1)];
+            (0..w * h).map(move |k| (level, [k % w, k / w]))
+        };
+        (0..bounds.levels()).flat_map(of).collect()
+    }
+
+    /// The error of a square's own triangles the slow way, its sides on or off the next level.
+    fn slow_error(field: &Field, level: u32, at: [u32; 2], stitched: bool) -> f32 {
+        let last = field.size().map(|n| n as i32 - 1);
+        let corner = |[i, j]: [i32; 2]| {
+            let fall = |n: i32, on: bool| if stitched && on { n & !1 } else { n };
+            let (on_x, on_z) = (i == 0 || i == 8, j == 0 || j == 8);
+            let place = [fall(i, on_z && !on_x), fall(j, on_x && !on_z)];
+            let [x, z] = [0, 1].map(|k| ((at[k] as i32 * 8 + place[k]) << level).min(last[k]));
+            Corner { x, z, y: field.height(x as u32, z as u32) }
+        };
+        let triangles = (0..8).flat_map(|j| (0..8).flat_map(move |i| rtin::cell(i, j)));
+        let triangles = triangles.map(|t| t.map(corner)).filter(|t| surface::doubled_area(t) != 0);
+        triangles.map(|t| deviation(field, &t)).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn errors_are_those_of_the_triangles() {
+        let field = rough([75, 52], 3);
+        let bounds = Bounds::new(&field, MEASURE);
+        assert_eq!(bounds.levels(), 5);
+        for (level, at) in squares(&bounds) {
+            let slow =
+                [false, true].map(|stitched| slow_error(&field, level, at, stitched)).into_iter().fold(0.0, f32::max);
+            let inner = (0..4).filter(|_| level > 0).map(|k| [2 * at[0] + k % 2, 2 * at[1] + k / 2]);
+            let inside = inner.filter(|child| (0..2).all(|k| child[k] * bounds.side(level - 1) < bounds.last[k]));
+            let slow = inside.map(|child| bounds.square(level - 1, child).error).fold(slow, f32::max);
+            let error = bounds.square(level, at).error;
+            assert!((error - slow).abs() <= 1e-5 * slow, "level {level} at {at:?}: {error} m, slowly {slow} m");
+        }
+    }
+
+    #[test]
+    fn what_is_known_of_a_tiled_field_holds_in_every_tile() {
+        for (size, tiles) in [([41, 30], [3, 4]), ([32, 64], [3, 2]), ([33, 57], [4, 1]), ([16, 16], [9, 9])] {
+            let field = rough(size, 9).tiled(tiles);
+            let (tiled, whole) = (Bounds::new(&field, MEASURE), Bounds::new(&held(&field), MEASURE));
+            assert!(tiled.bytes() < whole.bytes());
+            for (level, at) in squares(&whole) {
+                let (general, exact) = (tiled.square(level, at), whole.square(level, at));
+                let what = format!("{size:?} {tiles:?} level {level} at {at:?}: {general:?} {exact:?}");
+                assert!(general.error >= exact.error * (1.0 - 1e-6), "{what}");
+                assert!(general.range[0] <= exact.range[0] && general.range[1] >= exact.range[1], "{what}");
+                let aligned = size.iter().all(|n| n.is_multiple_of(8 << level)) && !whole.is_partial(level, at);
+                assert!(!aligned || general == exact, "{what}");
+            }
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Surfaces of a field at coarser levels, and how far they are from the samples. Level ℓ has a vertex on every
+//! 2^ℓ-th sample and the diagonals of [`rtin`].
+
+use rayon::prelude::*;
+
+use super::surface::{self, Corner};
+use super::{Field, rtin};
+
+/// A rectangle of cells of one level.
+#[derive(Clone, Copy)]
+pub struct Patch<'a> {
+    /// The field.
+    pub field: &'a Field,
+    /// Lattice position of its first vertex, a multiple of twice a cell's side.
+    pub first: [u32; 2],
+    /// Cells along (x, z).
+    pub cells: [u32; 2],
+    /// Its level.
+    pub level: u32,
+    /// Positions beyond this one collapse onto it.
+    pub last: [u32; 2],
+}
+
+impl Patch<'_> {
+    /// Lattice position of a vertex.
+    fn at(&self, vertex: [u32; 2]) -> [u32; 2] {
+        [0, 1].map(|k| (self.first[k] + (vertex[k] << self.level)).min(self.last[k]))
+    }
+
+    /// The largest vertical distance, metres, of its cells from the samples in them, holes excepted.
+    pub fn deviation(&self) -> f32 {
+        let row = |j: u32| self.row_deviation(j);
+        let largest = (0..self.cells[1]).into_par_iter().map(row).reduce(|| 0.0, f64::max);
+        // Upwards: the bound must not shrink by rounding.
+        (largest as f32).next_up() * f32::from(largest > 0.0)
+    }
+
+    /// A row of cells, sample row by sample row.
+    fn row_deviation(&self, j: u32) -> f64 {
+        let ([x0, z0], [x1, z1]) = (self.at([0, j]), self.at([self.cells[0], j + 1]));
+        let depth = z1 - z0;
+        if depth == 0 {
+            return 0.0;
+        }
+        let mut samples = Vec::with_capacity((x1 - x0 + 1) as usize);
+        let mut largest = 0.0f64;
+        let heights = |z: u32| -> Vec<f64> {
+            (0..=self.cells[0]).map(|i| f64::from(self.field.height(self.at([i, 0])[0], z))).collect()
+        };
+        let (north, south) = (heights(z0), heights(z1));
+        for v in 0..=depth {
+            samples.clear();
+            samples.extend((x0..=x1).map(|x| self.field.height(x, z0 + v)));
+            let part = f64::from(v) / f64::from(depth);
+            for i in 0..self.cells[0] {
+                let [first, last] = [i, i + 1].map(|i| self.at([i, 0])[0]);
+                if first == last {
+                    break;
+                }
+                let k = i as usize;
+                let corners = [north[k], north[k + 1], south[k], south[k + 1]];
+                let section = Section::new(corners, part, last - first, (i + j) & 1 == 0);
+                let off = section.deviation(&samples[(first - x0) as usize..=(last - x0) as usize], |u| {
+                    self.field.is_hole(first + u, z0 + v)
+                });
+                largest = largest.max(off);
+            }
+        }
+        largest
+    }
+
+    /// The same for the cells along its border, its sides `beyond` (1 or 2) levels coarser: vertices that such
+    /// a side lacks lie on its edges.
+    pub fn stitched_deviation(&self, beyond: u32) -> f32 {
+        let [w, h] = self.cells;
+        let rows = (0..h).into_par_iter().map(|j| {
+            let step = if j == 0 || j == h - 1 { 1 } else { (w - 1).max(1) };
+            let cells = (0..w).step_by(step as usize).flat_map(|i| rtin::cell(i as i32, j as i32));
+            cells.map(|triangle| self.triangle_deviation(triangle, beyond)).fold(0.0, f32::max)
+        });
+        rows.reduce(|| 0.0, f32::max)
+    }
+
+    fn triangle_deviation(&self, triangle: [[i32; 2]; 3], beyond: u32) -> f32 {
+        let corners = triangle.map(|vertex| self.stitched_corner(vertex.map(|n| n as u32), beyond));
+        if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(self.field, &corners) }
+    }
+
+    fn stitched_corner(&self, vertex: [u32; 2], beyond: u32) -> Corner {
+        let on = |k: usize| vertex[k] == 0 || vertex[k] == self.cells[k];
+        let along = match (on(0), on(1)) {
+            (true, false) => 1,
+            (false, true) => 0,
+            _ => return self.corner(vertex),
+        };
+        let [mut before, mut after] = [vertex; 2];
+        before[along] = vertex[along] >> beyond << beyond;
+        after[along] = before[along] + (1 << beyond);
+        // Vertices of the next level stay where they are in plan; others fall onto the one before.
+        let mut place = vertex;
+        place[along] &= !1;
+        let ends = [before, after].map(|end| self.corner(end).y);
+        let part = (place[along] - before[along]) as f32 / (1 << beyond) as f32;
+        Corner { y: ends[0] + (ends[1] - ends[0]) * part, ..self.corner(place) }
+    }
+
+    fn corner(&self, vertex: [u32; 2]) -> Corner {
+        let [x, z] = self.at(vertex);
+        Corner { x: x as i32, z: z as i32, y: self.field.height(x, z) }
+    }
+}
+
+/// A cell's surface over one row of samples: a line up to the diagonal, and another one beyond it.
+struct Section {
+    /// The last sample on the first line.
+    split: usize,
+    /// Height at the row's first sample and rise a sample, metres.
+    lines: [[f64; 2]; 2],
+}
+
+impl Section {
+    /// At `part` of the way from the north (corners 0 and 1) to the south (2 and 3); both triangles rise along the
+    /// row as their own side of the cell does.
+    fn new([a, b, c, d]: [f64; 4], part: f64, width: u32, even: bool) -> Self {
+        let width = f64::from(width);
+        let [west, east] = [a + (c - a) * part, b + (d - b) * part];
+        let [north, south] = [(b - a) / width, (d - c) / width];
+        let ([left, right], split) = if even { ([south, north], part) } else { ([north, south], 1.0 - part) };
+        Self { split: (split * width) as usize, lines: [[west, left], [east - right * width, right]] }
+    }
+
+    fn deviation(&self, samples: &[f32], is_hole: impl Fn(u32) -> bool) -> f64 {
+        let (left, right) = samples.split_at((self.split + 1).min(samples.len()));
+        let mut largest = 0.0f64;
+        for (first, samples, [start, rise]) in [(0, left, self.lines[0]), (left.len(), right, self.lines[1])] {
+            for (u, &sample) in samples.iter().enumerate() {
+                let off = (start + rise * (first + u) as f64 - f64::from(sample)).abs();
+                if off > largest && !is_hole((first + u) as u32) {
+                    largest = off;
+                }
+            }
+        }
+        largest
+    }
+}
+
+/// How much a level adds to the distance from the samples wherever its vertices may lie: the largest
+/// |h(p) − (h(p − a) + h(p + a)) / 2| over the samples p from `first` on, `side` along each axis, and over the four
+/// directions a in which p may be the midpoint of an edge of that level. Levels nest, so the sum over a level and
+/// all finer ones bounds the level's distance from the samples.
+pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32 {
+    let half = 1i64 << (level - 1);
+    let row = |z: u32| {
+        let sample = |x: i64, z: i64| wrapped(field, [x, z]).map(|[x, z]| f64::from(field.height(x, z)));
+        let mut largest = 0.0f64;
+        for x in first[0]..=first[0] + side[0] {
+            let [x, z] = [i64::from(x), i64::from(z)];
+            let Some(middle) = sample(x, z) else { continue };
+            for [dx, dz] in [[half, 0], [0, half], [half, half], [half, -half]] {
+                if let (Some(a), Some(b)) = (sample(x - dx, z - dz), sample(x + dx, z + dz)) {
+                    largest = largest.max((middle - (a + b) / 2.0).abs());
+                }
+            }
+        }
+        largest
+    };
+    let largest = (first[1]..=first[1] + side[1]).into_par_iter().map(row).reduce(|| 0.0, f64::max);
+    (largest as f32).next_up() * f32::from(largest > 0.0)
+}
+
+/// The stored sample at a position of the field repeated without end along its tiled axes; `None` outside.
+fn wrapped(field: &Field, at: [i64; 2]) -> Option<[u32; 2]> {
+    let (stored, size) = (field.stored(), field.size());
+    let axis = |k: usize| {
+        let n = i64::from(stored[k]);
+        if size[k] > stored[k] {
+            Some(at[k].rem_euclid(n) as u32)
+        } else {
+            (0..n).contains(&at[k]).then_some(at[k] as u32)
+        }
+    };
+    Some([axis(0)?, axis(1)?])
+}

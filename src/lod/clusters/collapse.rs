@@ -1,0 +1,157 @@
+//! From the leaves of the quadtree to clusters, in one pass from the top.
+
+use super::refine::{Refinement, Sight};
+use super::states::{Seeds, State};
+use super::tree::{Node, SIDES};
+use crate::draw::Instance;
+use crate::draw::weights::{self, FINER, ONE, STITCHED};
+use crate::view::{Containment, Frustum};
+
+/// What a quadrant of a cluster holds.
+const NOTHING: u8 = 0;
+const BLOCK: u8 = 1;
+const FOUR_BLOCKS: u8 = 2;
+
+/// The seam between two quadrants: its byte, the quadrants, and on which side of the first the second lies.
+const SEAMS: [(u32, [u32; 2], usize); 4] = [(0, [0, 1], 2), (1, [2, 3], 2), (2, [0, 2], 3), (3, [1, 3], 3)];
+
+/// The pass over a refined quadtree.
+pub struct Collapse<'a> {
+    /// What the refinement was made from.
+    pub sight: Sight<'a>,
+    /// Nodes outside it are not drawn.
+    pub frustum: &'a Frustum,
+    /// The split nodes.
+    pub refinement: &'a Refinement,
+    /// The clusters.
+    pub seeds: &'a Seeds,
+    /// Cells along a side of a block.
+    pub cells: u32,
+    /// Whether each block is an instance of its own.
+    pub single: bool,
+}
+
+impl Collapse<'_> {
+    /// Appends the clusters in sight: seed and instance.
+    pub fn run(&self, drawn: &mut Vec<(u32, Instance)>) {
+        let root = self.sight.tree.root();
+        match self.visit(root, false, drawn) {
+            FOUR_BLOCKS => self.push_cluster(root, [BLOCK; 4], drawn),
+            // A lone block is a quadrant of a parent that is not there.
+            BLOCK if !self.single => drawn.push((0, self.block(root))),
+            _ => {}
+        }
+    }
+
+    /// What a node leaves for its parent to draw; the rest is appended.
+    fn visit(&self, node: Node, inside: bool, drawn: &mut Vec<(u32, Instance)>) -> u8 {
+        let tree = self.sight.tree;
+        let Some(known) = Some(node).filter(|n| tree.contains(*n)).and_then(|n| tree.known(n)) else { return NOTHING };
+        let inside = inside
+            || match self.frustum.contains(&known.bounds) {
+                Containment::Outside => return NOTHING,
+                Containment::Crossing => false,
+                Containment::Inside => true,
+            };
+        if node.level == 0 || self.refinement.weight(tree, node).is_none() {
+            if !inside && !self.any_in_sight(node) {
+                return NOTHING;
+            }
+            if self.single {
+                drawn.push((0, self.block(node)));
+            }
+            return BLOCK;
+        }
+        let state = [0, 1, 2, 3].map(|quadrant| self.visit(node.child(quadrant), inside, drawn));
+        if state == [BLOCK; 4] {
+            return FOUR_BLOCKS;
+        }
+        if state != [NOTHING; 4] {
+            self.push_cluster(node, state, drawn);
+        }
+        NOTHING
+    }
+
+    /// Whether any of the finest blocks in a node that crosses the frustum's border may be seen: with the box of the
+    /// whole alone a coarse block might be drawn where finer ones are not, and a wider tolerance would draw more.
+    fn any_in_sight(&self, node: Node) -> bool {
+        let tree = self.sight.tree;
+        node.level == 0
+            || (0..4).map(|quadrant| node.child(quadrant)).filter(|child| tree.contains(*child)).any(|child| {
+                let containment = tree.known(child).map(|known| self.frustum.contains(&known.bounds));
+                match containment {
+                    None | Some(Containment::Outside) => false,
+                    Some(Containment::Inside) => true,
+                    Some(Containment::Crossing) => self.any_in_sight(child),
+                }
+            })
+    }
+
+    fn push_cluster(&self, node: Node, state: State, drawn: &mut Vec<(u32, Instance)>) {
+        if self.single {
+            return;
+        }
+        let (seed, turns) = self.seeds.of(state);
+        let level = node.level - 1;
+        let instance =
+            Instance { turns, cells: 4 * self.cells, weights: self.weights(node, state), ..self.placed(node, level) };
+        drawn.push((seed as u32, instance));
+    }
+
+    /// A block by itself: the first quadrant of a cluster, as if the cluster ended with it.
+    fn block(&self, node: Node) -> Instance {
+        let parent = node.parent();
+        let weight = |node| self.refinement.weight(self.sight.tree, node).unwrap_or(0);
+        let inside = if node == self.sight.tree.root() { 0 } else { weight(parent) };
+        let side = |side: usize| {
+            let sibling = node.beyond(side).is_some_and(|beyond| beyond.parent() == parent);
+            let root = node == self.sight.tree.root();
+            if sibling || root { inside } else { self.refinement.side_weight(&self.sight, parent, side) }
+        };
+        let weights = weights::uniform(inside, SIDES.map(side));
+        Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
+    }
+
+    /// An instance at a node's first vertex, two mesh units a cell of a level.
+    fn placed(&self, node: Node, level: u32) -> Instance {
+        let origin = self.sight.tree.first(node).map(|n| n as i32);
+        Instance { origin, level, shift: level as i32 - 1, ..Instance::default() }
+    }
+
+    /// The weights of a cluster in a node. Blocks go over into their parent: that of a single one is the cluster's
+    /// node, that of four is their quadrant.
+    fn weights(&self, node: Node, state: State) -> [u32; 4] {
+        let mut weights = [0; 4];
+        let weight = |node| self.refinement.weight(self.sight.tree, node).unwrap_or(0);
+        for quadrant in (0..4).filter(|&quadrant| state[quadrant as usize] != NOTHING) {
+            let fine = state[quadrant as usize] == FOUR_BLOCKS;
+            let parent = if fine { node.child(quadrant) } else { node };
+            let finer = if fine { FINER } else { 0 };
+            weights::set(&mut weights, weights::inside(quadrant as usize), weight(parent) | finer);
+            for (slot, side) in outer_sides(quadrant) {
+                weights::set(&mut weights, slot, self.refinement.side_weight(&self.sight, parent, side));
+            }
+        }
+        for (byte, [first, second], side) in SEAMS {
+            weights::set(&mut weights, (3, byte), self.seam_weight(node, state, [first, second], side));
+        }
+        weights
+    }
+
+    /// The weight between two quadrants: beside one of four blocks that of its side.
+    fn seam_weight(&self, node: Node, state: State, quadrants: [u32; 2], side: usize) -> u32 {
+        let fine = |k: usize| state[quadrants[k] as usize] == FOUR_BLOCKS;
+        let weight = match (fine(0), fine(1)) {
+            (true, _) => self.refinement.side_weight(&self.sight, node.child(quadrants[0]), side),
+            (_, true) => self.refinement.side_weight(&self.sight, node.child(quadrants[1]), side ^ 2),
+            _ => self.refinement.weight(self.sight.tree, node).unwrap_or(0),
+        };
+        if weight < ONE { weight } else { STITCHED }
+    }
+}
+
+/// The halves of outer sides that a quadrant has: slot and side.
+fn outer_sides(quadrant: u32) -> [(weights::Slot, usize); 2] {
+    let [right, lower] = [quadrant & 1, quadrant >> 1];
+    [((1 + right as usize, lower), 2 * right as usize), ((1 + lower as usize, 2 + right), 1 + 2 * lower as usize)]
+}

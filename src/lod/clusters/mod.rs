@@ -1,0 +1,209 @@
+//! Symmetric cluster sets: a quadtree of blocks, drawn as few batches of few kinds.
+//!
+//! After J. Judnich and N. Ling, "Symmetric Cluster Set Level of Detail for Real-Time Terrain Rendering" (2012). A
+//! leaf of the quadtree is a block of n × n cells. A node and the two levels below it make a cluster, whose quadrants
+//! hold nothing, a block, or 2 × 2 blocks: 80 states, 23 up to quarter turns, each a range of indices into one grid
+//! of vertices that the height texture displaces. Turns are swaps of integers on the lattice.
+//!
+//! Where this differs from the paper, and why:
+//! - level 0 is the finest, as everywhere here;
+//! - 23 kinds are 23 instanced draws in one indirect submission, not a draw a cluster, which is the variant
+//!   `draw-per-cluster`; its baseline is `draw-per-block`: the same triangles, a draw a block;
+//! - with the metric `certified` the error is a bound, which eq. 1 is not off the view axis;
+//! - neighbours are within one level of each other, and a side that meets a coarser block falls onto its edge: no
+//!   skirts are needed;
+//! - with `morph=on` the blocks in a node go over into it as eq. 3 and 4 have it, with a weight for each quadrant:
+//!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
+//!   of their own, those of the coarser of their two blocks, so that both agree on them;
+//! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
+//!
+//! Laws kept: watertight, covered once, error within tolerance (`error=measured`), no state between views.
+
+mod collapse;
+pub mod mesh;
+mod refine;
+pub mod states;
+mod tree;
+
+use std::sync::Arc;
+
+use self::collapse::Collapse;
+use self::mesh::Mesh;
+use self::refine::{Refinement, Sight};
+use self::states::Seeds;
+use self::tree::Tree;
+use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::height::Field;
+use crate::height::bounds::Measure;
+use crate::view::View;
+
+/// Blocks that morph begin to leave their level where the allowed error reaches their parent's, and have left it at
+/// this many times that: a longer way draws the finer level for longer, a shorter one is seen.
+const MORPH_RATIO: f64 = 1.3;
+
+/// The most blocks drawn, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
+const MOST_BLOCKS: usize = 1 << 17;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "clusters",
+    about: "quadtree of blocks, drawn as clusters of 23 kinds, turned",
+    paper: "Judnich & Ling 2012",
+    variants: &[
+        Variant { name: "draw-per-block", about: "a recorded draw a block: the paper's baseline, CLOD" },
+        Variant { name: "draw-per-cluster", about: "a recorded draw a cluster, as published" },
+    ],
+    settings: &[
+        Setting {
+            key: "block",
+            values: Values::Words(&["8", "16", "32", "64", "128"]),
+            default: "32",
+            about: "cells along a side of a block",
+        },
+        Setting {
+            key: "error",
+            values: Values::Words(&["measured", "halved"]),
+            default: "measured",
+            about: "a block's error: against the samples, or half its parent's (eq. 2)",
+        },
+        Setting {
+            key: "morph",
+            values: Values::Words(&["off", "on"]),
+            default: "off",
+            about: "whether blocks go over into their parent, or change at once",
+        },
+    ],
+    build: |field, settings| Box::new(Clusters::new(&field, settings)),
+};
+
+/// How clusters reach the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    DrawPerBlock,
+    DrawPerCluster,
+    Indirect,
+}
+
+struct Clusters {
+    most_blocks: usize,
+    tree: Tree,
+    seeds: Seeds,
+    mesh: Mesh,
+    refinement: Refinement,
+    mode: Mode,
+    cells: u32,
+    morph: bool,
+    measured: bool,
+    /// Seed and instance of what is drawn.
+    drawn: Vec<(u32, Instance)>,
+}
+
+impl Clusters {
+    fn new(field: &Arc<Field>, settings: &Settings) -> Self {
+        let cells = settings.number("block") as u32;
+        let morph = settings.word("morph") == "on";
+        let measured = settings.word("error") == "measured";
+        let mode = match settings.variant() {
+            Some("draw-per-block") => Mode::DrawPerBlock,
+            Some("draw-per-cluster") => Mode::DrawPerCluster,
+            _ => Mode::Indirect,
+        };
+        let band = if morph { MORPH_RATIO } else { 1.0 };
+        let tree = Tree::new(field, Measure { cells, growth: band as f32, errors: measured, morph }, !measured);
+        let seeds = Seeds::new(mode == Mode::DrawPerBlock);
+        let mesh = Mesh::new(cells as i32, &seeds.states);
+        // A quadtree has at most three leaves more for each split node.
+        let most_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MOST_BLOCKS / 3);
+        let most_blocks = tree.nodes(0).min(3 * most_splits + 1);
+        let refinement = Refinement::new(band, most_splits);
+        Self { most_blocks, tree, seeds, mesh, refinement, mode, cells, morph, measured, drawn: Vec::new() }
+    }
+
+    /// Refines the quadtree, with a wider tolerance if there would be too many blocks.
+    fn collapse(&mut self, view: &View) {
+        let frustum = view.frustum();
+        let mut wider = *view;
+        let mut drawn = std::mem::take(&mut self.drawn);
+        drawn.clear();
+        loop {
+            let allowance = wider.allowance();
+            let sight = Sight { tree: &self.tree, allowance: &allowance, frustum: (!self.morph).then_some(&frustum) };
+            if self.refinement.refine(&sight) {
+                let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
+                Collapse { sight, frustum: &frustum, refinement, seeds, cells: self.cells, single }.run(&mut drawn);
+                break;
+            }
+            wider.tolerance.px = 1.5 * wider.tolerance.px.max(f64::MIN_POSITIVE);
+        }
+        self.drawn = drawn;
+    }
+
+    /// A draw for each kind of cluster that occurs.
+    fn draw_instanced(&self, list: &mut DrawList) {
+        let mut ends = vec![0u32; self.mesh.ranges.len() + 1];
+        self.drawn.iter().for_each(|&(seed, _)| ends[seed as usize + 1] += 1);
+        (1..ends.len()).for_each(|seed| ends[seed] += ends[seed - 1]);
+        let mut next = ends.clone();
+        list.instances.resize(self.drawn.len(), Instance::default());
+        for &(seed, instance) in &self.drawn {
+            let place = &mut next[seed as usize];
+            list.instances[*place as usize] = Instance { batch: *place, ..instance };
+            *place += 1;
+        }
+        for (seed, instances) in ends.windows(2).enumerate().filter(|(_, ends)| ends[0] < ends[1]) {
+            self.push(list, seed, instances[0]..instances[1]);
+        }
+    }
+
+    /// The published ways: a draw for each cluster or block.
+    fn draw_each(&self, list: &mut DrawList) {
+        list.submission = Submission::Direct;
+        for (batch, &(seed, instance)) in (0u32..).zip(&self.drawn) {
+            list.instances.push(Instance { batch, ..instance });
+            self.push(list, seed as usize, batch..batch + 1);
+        }
+    }
+
+    fn push(&self, list: &mut DrawList, seed: usize, instances: std::ops::Range<u32>) {
+        let indices = self.mesh.ranges[seed].clone();
+        list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+    }
+}
+
+impl Technique for Clusters {
+    fn resident(&self) -> &Geometry {
+        &self.mesh.geometry
+    }
+
+    fn limits(&self) -> Limits {
+        let draws = if self.mode == Mode::Indirect { self.mesh.ranges.len() } else { self.most_blocks };
+        Limits { draws, instances: self.most_blocks, ..Limits::default() }
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.collapse(view);
+        match self.mode {
+            Mode::Indirect => self.draw_instanced(list),
+            Mode::DrawPerBlock | Mode::DrawPerCluster => self.draw_each(list),
+        }
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        self.measured
+    }
+
+    fn morphs(&self) -> bool {
+        // Without morphing too: sides that meet a coarser block fall onto its edge.
+        true
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![
+            ("kinds of clusters", self.mesh.ranges.len() as f64, ""),
+            ("index bytes", size_of_val(self.mesh.geometry.indices.as_slice()) as f64, "B"),
+            ("vertex bytes", size_of_val(self.mesh.geometry.lattice.as_slice()) as f64, "B"),
+            ("bytes of ranges and errors", self.tree.bytes() as f64, "B"),
+        ]
+    }
+}

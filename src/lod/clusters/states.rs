@@ -1,0 +1,122 @@
+//! What a cluster may consist of: 80 states, 23 of them different under quarter turns.
+//!
+//! Judnich & Ling 2012, section IV: single-level clusters have 2⁴ − 1 = 15 states and 5 seeds; with quadrants that
+//! may also be 2 × 2 blocks there are 3⁴ − 1 = 80 states. By Burnside's lemma (81 + 3 + 9 + 3) / 4 − 1 = 23 seeds.
+
+/// What the quadrants hold, number `q = (x half) + 2 (z half)`: nothing (0), a block (1), 2 × 2 blocks of the next
+/// finer level (2).
+pub type State = [u8; 4];
+
+/// Where a quarter turn, (x, z) to (cells − z, x), takes each quadrant.
+const TURNED: [usize; 4] = [1, 3, 0, 2];
+
+/// A state after quarter turns.
+pub fn turned(state: State, turns: u32) -> State {
+    (0..turns).fold(state, |state, _| {
+        let mut next = State::default();
+        (0..4).for_each(|quadrant| next[TURNED[quadrant]] = state[quadrant]);
+        next
+    })
+}
+
+/// The states that are held, and how each state comes from them.
+pub struct Seeds {
+    /// The seeds: of the four turns of a state, the one with the lowest number.
+    pub states: Vec<State>,
+    /// By the number of a state: its seed and how often it is turned.
+    table: [(u8, u8); 81],
+}
+
+/// A state as a number in base 3.
+fn number(state: State) -> usize {
+    state.iter().rev().fold(0, |number, &quadrant| 3 * number + usize::from(quadrant))
+}
+
+fn state(number: usize) -> State {
+    [1, 3, 9, 27].map(|place| (number / place % 3) as u8)
+}
+
+impl Seeds {
+    /// All 23, or with `single` only the state of a single block.
+    pub fn new(single: bool) -> Self {
+        let mut seeds = Self { states: Vec::new(), table: [(0, 0); 81] };
+        for seed in 1..if single { 2 } else { 81 } {
+            let turns = [0, 1, 2, 3].map(|turns| turned(state(seed), turns));
+            if turns.iter().any(|&turn| number(turn) < seed) {
+                continue;
+            }
+            // A state that turns into itself is turned as little as possible.
+            for turn in [3, 2, 1, 0] {
+                seeds.table[number(turns[turn])] = (seeds.states.len() as u8, turn as u8);
+            }
+            seeds.states.push(state(seed));
+        }
+        seeds
+    }
+
+    /// The seed of a state, and the quarter turns that make it the state.
+    pub fn of(&self, state: State) -> (usize, u32) {
+        let (seed, turns) = self.table[number(state)];
+        (usize::from(seed), u32::from(turns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::Mesh;
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_state_is_a_turned_seed() {
+        let seeds = Seeds::new(false);
+        assert_eq!(seeds.states.len(), 23);
+        for number in 1..81 {
+            let (seed, turns) = seeds.of(state(number));
+            assert_eq!(turned(seeds.states[seed], turns), state(number));
+        }
+        let single: BTreeSet<_> =
+            (1..81).map(state).filter(|s| s.iter().all(|&q| q < 2)).map(|s| seeds.of(s).0).collect();
+        assert_eq!(single.len(), 5);
+        // No seed is a turn of another.
+        let turns: BTreeSet<_> = seeds.states.iter().flat_map(|&s| (0..4).map(move |t| turned(s, t))).collect();
+        assert_eq!(turns.len(), 80);
+    }
+
+    /// The turned triangles of the seed are those of the state, made by a mesh of its own.
+    #[test]
+    fn turned_seeds_draw_exactly_the_quadrants_asked_for() {
+        let n = 8;
+        let seeds = Seeds::new(false);
+        let mesh = Mesh::new(n, &seeds.states);
+        let set = |mesh: &Mesh, seed: usize, turns: u32| -> BTreeSet<[[i32; 2]; 3]> {
+            let range = &mesh.ranges[seed];
+            let indices = &mesh.geometry.indices[range.start as usize..range.end as usize];
+            let turn =
+                |[x, z]: [i32; 2]| [[x, z], [4 * n - z, x], [4 * n - x, 4 * n - z], [z, 4 * n - x]][turns as usize];
+            let corner = |&k: &u32| turn(mesh.geometry.lattice[k as usize].position);
+            // Corners in cyclic order from the smallest: the winding counts.
+            let canonical = |t: &[u32]| {
+                let [a, b, c] = [corner(&t[0]), corner(&t[1]), corner(&t[2])];
+                [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()
+            };
+            indices.chunks_exact(3).map(canonical).collect()
+        };
+        for number in 1..81 {
+            let (seed, turns) = seeds.of(state(number));
+            let own = Mesh::new(n, &[state(number)]);
+            let drawn = set(&mesh, seed, turns);
+            assert_eq!(drawn, set(&own, 0, 0), "{:?}", state(number));
+            for (quadrant, &what) in state(number).iter().enumerate() {
+                let of = |t: &&[[i32; 2]; 3]| {
+                    let middle = [0, 1].map(|k| t.iter().map(|corner| corner[k]).sum::<i32>());
+                    [quadrant & 1, quadrant >> 1] == middle.map(|n3| usize::from(n3 >= 3 * 2 * n))
+                };
+                let area = |[a, b, c]: &[[i32; 2]; 3]| (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1]);
+                let inside: Vec<_> = drawn.iter().filter(of).collect();
+                assert_eq!(inside.len() as i32, [0, 2, 8][usize::from(what)] * n * n);
+                assert!(inside.iter().all(|t| area(t) == [0, 4, 1][usize::from(what)]));
+            }
+        }
+    }
+}
