@@ -33,7 +33,8 @@ pub struct Measure {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Square {
     /// The largest distance, metres, of its surface from the samples, holes excepted: with any of its sides one
-    /// level coarser too, and at least `growth` times that of the squares in it.
+    /// level coarser too, and at least `growth` times that of the squares in it. 0 at level 0, where only a coarser side
+    /// is off the samples, and that is within the error of the square beyond it.
     pub error: f32,
     /// Lowest and highest sample, metres; the lowest is above the highest if there is no land.
     pub range: [f32; 2],
@@ -156,12 +157,14 @@ impl Bounds {
         }
         let [low, high] = children.range;
         let aligned = (0..2).all(|k| self.period[k].is_none_or(|n| is_aligned(n, level, side)));
-        let own = if !self.measure.errors {
+        let own = if !self.measure.errors || level == 0 {
             0.0
         } else if aligned {
             self.error(field, level, first)
         } else {
-            children.error + levels::detail(field, first, reach, level + 1)
+            // Level 1 is the first to add to the samples; the next one, on the sides.
+            let levels = if level == 1 { 1..=2 } else { level + 1..=level + 1 };
+            children.error + levels.map(|level| levels::detail(field, first, reach, level)).sum::<f32>()
         };
         let rounding = if self.measure.morph && own > 0.0 { low.abs().max(high.abs()) * ROUNDING } else { 0.0 };
         Square { error: (own + rounding).max(children.error * self.measure.growth), range: children.range }
@@ -173,9 +176,9 @@ impl Bounds {
         // What sticks out of the field collapses; what repeats is looked at once.
         let length = self.period.map(|period| period.unwrap_or(u32::MAX).min(self.side(level)));
         let patch = |level: u32| Patch { field, first, cells: length.map(|n| n >> level), level, last };
-        let own = if level == 0 { 0.0 } else { patch(level).deviation() };
+        let own = patch(level).deviation();
         // Squares in it that go over into it have sides two levels coarser than themselves.
-        let way = if self.measure.morph && level > 0 { patch(level - 1).stitched_deviation(2) } else { 0.0 };
+        let way = if self.measure.morph { patch(level - 1).stitched_deviation(2) } else { 0.0 };
         own.max(way).max(patch(level).stitched_deviation(1))
     }
 }

@@ -1,15 +1,19 @@
 //! Clusters: every way to draw them draws the same triangles, at far fewer draws.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, Submission};
+use cuesta::draw::{Draw, DrawList, Instance, Source, Submission, Topology, weights};
+use cuesta::height::bounds::{Bounds, Measure};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::Technique;
+use cuesta::lod::clusters::mesh::Mesh;
+use cuesta::measure::geometric;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 
-use super::technique;
+use super::{heights, technique};
 
 /// A deterministic number in 0..1.
 fn random(seed: &mut u64) -> f64 {
@@ -31,17 +35,23 @@ fn land(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
     Arc::new(Field::new(Samples::F32(heights), size, [3.0, 2.0], holes))
 }
 
+/// From within the field, or all of it through parallel rays, where the tolerance is the same everywhere.
 fn anywhere(field: &Field, seed: &mut u64) -> View {
     let [w, h] = field.size().map(f64::from);
     let eye = field.world_at(w * random(seed), h * random(seed), 20.0 + 300.0 * random(seed).powi(3));
-    View {
+    let near = View {
         eye,
         world_from_eye: View::turned(360.0 * random(seed), -90.0 * random(seed), 0.0),
         lens: Lens::Perspective { fov_x: 0.4 + 1.6 * random(seed) },
         size: [320, 200],
         near: 0.1,
         tolerance: Tolerance { px: 20.0 * random(seed) + 0.1, metric: Metric::Certified },
+    };
+    if random(seed) < 0.5 {
+        return near;
     }
+    let far = View { lens: Lens::Orthographic { width: 6.0 * w.max(h) * random(seed), far: 1e5 }, ..near };
+    View { eye: field.world_at(w / 2.0, h / 2.0, 0.0) - far.forward() * 2000.0, ..far }
 }
 
 /// Corners of a triangle: position and the height's bits.
@@ -63,11 +73,11 @@ fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Corn
 }
 
 #[test]
-fn a_thousand_quadtrees_are_drawn_alike_in_every_mode() {
+fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance() {
     let mut seed = 11;
-    let (mut blocks, mut clusters, mut kinds) = (0, 0, std::collections::BTreeSet::new());
+    let (mut blocks, mut clusters, mut kinds, mut closest) = (0, 0, BTreeSet::new(), 0.0f64);
     for k in 0..50 {
-        let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129]][k % 4]);
+        let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129], [17, 17]][k % 5]);
         let settings = ["block=8", ["morph=off", "morph=on"][k / 2 % 2]];
         let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
             .map(|m| technique(&field, m, &settings));
@@ -82,11 +92,81 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode() {
             });
             assert!(list.draws.len() <= 23 && list.commands() <= 1 && each.draws.len() == list.instances.len());
             kinds.extend(list.draws.iter().map(|draw| draw.indices.start));
+            let errors = geometric::errors(&field, &view, modes[0].resident(), &list);
+            let share = errors.screen_px.max / view.tolerance.px;
+            assert!(share <= 1.0 + 1e-9, "{share} of the tolerance, {settings:?}, at {:?}", errors.screen_at);
+            closest = closest.max(share);
             blocks += single.draws.len();
             clusters += each.draws.len();
         }
     }
-    println!("{blocks} blocks in {clusters} clusters of {} kinds", kinds.len());
+    println!("{blocks} blocks in {clusters} clusters of {} kinds, {closest} of the tolerance", kinds.len());
+    assert!(closest > 0.9, "the bound is no trivial one: {closest} of the tolerance");
     assert!(kinds.len() == 23, "only {} kinds of clusters occurred", kinds.len());
     assert!(clusters * 3 < blocks, "{clusters} clusters for {blocks} blocks");
+}
+
+/// Flat but for a rough spot on each side of the squares of sixteen samples.
+fn rough_spots(seed: &mut u64) -> Field {
+    let (reach, along) = (2 + (*seed >> 40) as u32 % 3, 2 + (*seed >> 44) as u32 % 11);
+    let spot = |a: u32, b: u32| (a + 2) % 16 < 5 && b % 16 >= along && b % 16 < along + reach;
+    let rough = |k: u32| spot(k % 129, k / 129) || spot(k / 129, k % 129);
+    let height = |k: u32| if rough(k) { 100.0 * random(seed) as f32 } else { 0.0 };
+    Field::new(Samples::F32((0..129 * 129).map(height).collect()), [129; 2], [1.0; 2], Holes::none(129 * 129))
+}
+
+/// The four blocks in a node on their way into it, anywhere on it: within the node's error.
+#[test]
+fn no_weights_exceed_the_error() {
+    let (mut seed, mut closest, mut beyond_still) = (5, [0.0f64; 4], 0);
+    let mesh = Mesh::new(16, &[[1, 0, 0, 0]]);
+    for _ in 0..20 {
+        let field = rough_spots(&mut seed);
+        let view = anywhere(&field, &mut seed);
+        let measure = |morph| Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph });
+        let (bounds, still) = (measure(true), measure(false));
+        for level in 1..4u32 {
+            let nodes = 128 >> (3 + level);
+            for (node, draw) in (0..nodes * nodes).flat_map(|node| (0..8).map(move |draw| (node, draw))) {
+                let at = [node % nodes, node / nodes];
+                // A side is beyond the next level only if the inside is on its way.
+                let inside = [0, 0, 0, 63, 0, 17, 40, 63][draw];
+                let sides = [
+                    [0; 4],
+                    [64; 4],
+                    [127; 4],
+                    [127; 4],
+                    [90, 64, 127, 0],
+                    [64, 81, 17, 70],
+                    [64, 104, 90, 40],
+                    [127, 64, 100, 63],
+                ][draw];
+                let instance = Instance {
+                    origin: at.map(|n| (n * bounds.side(level)) as i32),
+                    cells: 32,
+                    level: level - 1,
+                    shift: level as i32 - 2,
+                    weights: weights::uniform(inside, sides),
+                    ..Instance::default()
+                };
+                let indices = mesh.ranges[0].clone();
+                let draws =
+                    vec![Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances: 0..1 }];
+                let list = DrawList { draws, instances: vec![instance], ..DrawList::default() };
+                let drawn = heights(&field, &view, &mesh.geometry, &list);
+                let off = (0u32..).zip(&drawn).filter(|(_, y)| !y.is_nan());
+                let off = off.map(|(k, y)| (y - f64::from(field.height(k % 129, k / 129))).abs()).fold(0.0, f64::max);
+                let error = f64::from(bounds.square(level, at).error);
+                let on_sides = level == 1;
+                assert!(on_sides || off <= error, "level {level} at {at:?}, {inside} {sides:?}: {off} m of {error} m");
+                closest[level as usize] = closest[level as usize].max(if on_sides { 0.0 } else { off / error });
+                beyond_still += usize::from(off > f64::from(still.square(level, at).error));
+            }
+        }
+    }
+    // The shapes on the way are needed, and no more than needed.
+    assert!(
+        closest[2..].iter().all(|&c| c > 0.97) && beyond_still > 0,
+        "{closest:?}, {beyond_still} beyond what levels draw"
+    );
 }

@@ -6,8 +6,8 @@
 //!
 //! Neighbours are kept within one level of each other, weights included: a node's ratio is at most that of every
 //! finer node on its sides. It is enough to pass the ratio of each split node to the two coarser neighbours of its
-//! own outer sides, from the finest level up. Level 0 takes part though it cannot be split: a block that is too
-//! coarse if stitched has no coarser neighbour.
+//! own outer sides, from the finest level up. Blocks of level 0 are never too coarse: stitched to a coarser neighbour
+//! they are off the samples on the common side only, which the neighbour's ε covers.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -60,7 +60,7 @@ impl Refinement {
         self.index.clear();
         self.count = 0;
         self.descend(sight, root, sight.frustum.is_none());
-        for level in 0..root.level {
+        for level in 1..root.level {
             for k in 0..self.splits[level as usize].len() {
                 let Split { at, ratio } = self.splits[level as usize][k];
                 self.restrict(sight, Node { level, at }, ratio);
@@ -70,7 +70,7 @@ impl Refinement {
     }
 
     fn descend(&mut self, sight: &Sight, node: Node, inside: bool) {
-        if self.count > self.most || !sight.tree.contains(node) {
+        if node.level == 0 || self.count > self.most || !sight.tree.contains(node) {
             return;
         }
         let Some(known) = sight.tree.known(node) else { return };
@@ -85,17 +85,13 @@ impl Refinement {
             return;
         }
         self.insert(node, ratio);
-        if node.level > 0 {
-            (0..4).for_each(|quadrant| self.descend(sight, node.child(quadrant), inside));
-        }
+        (0..4).for_each(|quadrant| self.descend(sight, node.child(quadrant), inside));
     }
 
     fn insert(&mut self, node: Node, ratio: f64) {
         let splits = &mut self.splits[node.level as usize];
-        if node.level > 0 {
-            self.count += 1;
-            self.index.insert(node, splits.len() as u32);
-        }
+        self.count += 1;
+        self.index.insert(node, splits.len() as u32);
         splits.push(Split { at: node.at, ratio });
     }
 

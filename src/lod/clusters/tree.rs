@@ -121,11 +121,9 @@ impl Tree {
         })
     }
 
-    /// ε; nothing finer than the finest level is ever asked for by eq. 2.
     fn error(&self, level: u32, measured: f32) -> f32 {
         match self.errors {
             Errors::Measured => measured,
-            Errors::Halved(_) if level == 0 => 0.0,
             Errors::Halved(root) => root / (1u64 << (self.root().level - level)) as f32,
         }
     }
