@@ -66,6 +66,11 @@ impl KitScene {
         Terrain { name, size: [self.side; 2], spacing_m: [1.0; 2] }
     }
 
+    /// The field and the path.
+    pub fn name(&self) -> String {
+        format!("{}, {}", self.terrain(), self.path)
+    }
+
     /// Makes the field.
     pub fn field(&self) -> Arc<Field> {
         let mut field = synth::synth(self.kind, [self.side; 2], self.seed);

@@ -89,6 +89,9 @@ pub struct MeasureArgs {
     /// The public benchmark kit; terrains that are given join it.
     #[arg(long)]
     pub kit: bool,
+    /// Of the kit, only the scenes whose name contains one of these, as in "peers-1 2049".
+    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
+    pub only: Vec<String>,
     /// A quarter of the frames and two rounds: to see that all works, not to quote.
     #[arg(long)]
     pub quick: bool,
@@ -134,8 +137,8 @@ fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
 
 fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let folder = args.out.as_deref().context("--out DIR is missing")?;
-    let mut laboratory = laboratory(common)?;
     let planned = Planned::new(common, args)?;
+    let mut laboratory = laboratory(common)?;
     let header = header(laboratory.as_mut(), &planned)?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));

@@ -75,7 +75,7 @@ impl Planned {
         ensure!(args.tolerance.iter().all(|px| px.is_finite() && *px > 0.0), "--tolerance: expected positive pixels");
         let (mut fields, mut flights) = (Vec::new(), Vec::new());
         if args.kit {
-            of_kit(common, &mut fields, &mut flights);
+            of_kit(common, &args.only, &mut fields, &mut flights)?;
         }
         of_files(common, args, &mut fields, &mut flights)?;
         if args.quick {
@@ -117,8 +117,14 @@ fn asked(name: &str, choices: &[(String, String)]) -> Result<Asked> {
     Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
 }
 
-fn of_kit(common: &Common, fields: &mut Vec<(Terrain, Arc<Field>)>, flights: &mut Vec<Flight>) {
-    for scene in kit::SCENES {
+fn of_kit(
+    common: &Common,
+    only: &[String],
+    fields: &mut Vec<(Terrain, Arc<Field>)>,
+    flights: &mut Vec<Flight>,
+) -> Result<()> {
+    let is_wanted = |scene: &&kit::KitScene| only.is_empty() || only.iter().any(|text| scene.name().contains(text));
+    for scene in kit::SCENES.iter().filter(is_wanted) {
         let terrain = scene.terrain();
         if fields.iter().all(|(other, _)| *other != terrain) {
             let _spinner = report::spinner(common, format!("making {terrain}"));
@@ -127,6 +133,11 @@ fn of_kit(common: &Common, fields: &mut Vec<(Terrain, Arc<Field>)>, flights: &mu
         let kit::KitScene { path, frames, every, .. } = *scene;
         flights.push(Flight { terrain, path, size: kit::SIZE, frames, every });
     }
+    if flights.is_empty() {
+        let names: Vec<_> = kit::SCENES.iter().map(kit::KitScene::name).collect();
+        bail!("--only {}: the kit has no such scene, expected a part of: {}", only.join(","), names.join("; "));
+    }
+    Ok(())
 }
 
 fn of_files(
@@ -213,6 +224,7 @@ fn arguments(args: &MeasureArgs) -> Vec<String> {
     let [w, h] = args.size;
     if args.kit {
         list.push(format!("--kit (version {})", kit::VERSION));
+        list.extend((!args.only.is_empty()).then(|| format!("--only {}", joined(&args.only))));
     } else {
         list.push(format!("--path {} --size {w}x{h} --frames {}", joined(&args.path), args.frames));
     }

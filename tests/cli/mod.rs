@@ -158,6 +158,8 @@ fn wrong_use_is_one_line_and_exit_code_2() {
     refused(at, &["bench", "demo", "--out", "run", "--rounds", "0"], &["--rounds"]);
     refused(at, &["bench", "demo", "--out", "run", "--metric", "best"], &["--metric"]);
     refused(at, &["bench", "compare", "a"], &["<B>"]);
+    refused(at, &["bench", "--kit", "--only", "moon", "--out", "run"], &["moon", "peers-1 2049x2049, fly"]);
+    refused(at, &["bench", "demo", "--only", "peers", "--out", "run"], &["--kit"]);
     refused(at, &["bench", "compare", "a", "b"], &["rows.jsonl"]);
     refused(at, &["report", "nowhere"], &["nowhere", "rows.jsonl"]);
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 3, "nothing is left behind");
