@@ -118,13 +118,12 @@ fn rough_spots(seed: &mut u64) -> Field {
 /// The four blocks in a node on their way into it, anywhere on it: within the node's error.
 #[test]
 fn no_weights_exceed_the_error() {
-    let (mut seed, mut closest, mut beyond_still) = (5, [0.0f64; 4], 0);
+    let (mut seed, mut closest) = (5, [0.0f64; 4]);
     let mesh = Mesh::new(16, &[[1, 0, 0, 0]]);
     for _ in 0..20 {
         let field = rough_spots(&mut seed);
         let view = anywhere(&field, &mut seed);
-        let measure = |morph| Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph });
-        let (bounds, still) = (measure(true), measure(false));
+        let bounds = Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph: true });
         for level in 1..4u32 {
             let nodes = 128 >> (3 + level);
             for (node, draw) in (0..nodes * nodes).flat_map(|node| (0..8).map(move |draw| (node, draw))) {
@@ -160,13 +159,9 @@ fn no_weights_exceed_the_error() {
                 let on_sides = level == 1;
                 assert!(on_sides || off <= error, "level {level} at {at:?}, {inside} {sides:?}: {off} m of {error} m");
                 closest[level as usize] = closest[level as usize].max(if on_sides { 0.0 } else { off / error });
-                beyond_still += usize::from(off > f64::from(still.square(level, at).error));
             }
         }
     }
-    // The shapes on the way are needed, and no more than needed.
-    assert!(
-        closest[2..].iter().all(|&c| c > 0.97) && beyond_still > 0,
-        "{closest:?}, {beyond_still} beyond what levels draw"
-    );
+    // And the errors are no more than needed.
+    assert!(closest[2..].iter().all(|&share| share > 0.97), "{closest:?} of the error");
 }
