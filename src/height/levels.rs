@@ -149,16 +149,20 @@ impl Section {
 /// directions a in which p may be the midpoint of an edge of that level. Levels nest, so the sum over a level and
 /// all finer ones bounds the level's distance from the samples.
 pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32 {
-    let half = 1i64 << (level - 1);
+    // Half an edge; once around a tiled axis changes nothing.
+    let [a, b] = [0, 1].map(|k| {
+        let half = 1i64 << (level - 1);
+        if field.size()[k] > field.stored()[k] { half % i64::from(field.stored()[k]) } else { half }
+    });
     let row = |z: u32| {
         let sample = |x: i64, z: i64| wrapped(field, [x, z]).map(|[x, z]| f64::from(field.height(x, z)));
         let mut largest = 0.0f64;
         for x in first[0]..=first[0] + side[0] {
             let [x, z] = [i64::from(x), i64::from(z)];
             let Some(middle) = sample(x, z) else { continue };
-            for [dx, dz] in [[half, 0], [0, half], [half, half], [half, -half]] {
-                if let (Some(a), Some(b)) = (sample(x - dx, z - dz), sample(x + dx, z + dz)) {
-                    largest = largest.max((middle - (a + b) / 2.0).abs());
+            for [dx, dz] in [[a, 0], [0, b], [a, b], [a, -b]] {
+                if let (Some(before), Some(after)) = (sample(x - dx, z - dz), sample(x + dx, z + dz)) {
+                    largest = largest.max((middle - (before + after) / 2.0).abs());
                 }
             }
         }
@@ -173,10 +177,11 @@ fn wrapped(field: &Field, at: [i64; 2]) -> Option<[u32; 2]> {
     let (stored, size) = (field.stored(), field.size());
     let axis = |k: usize| {
         let n = i64::from(stored[k]);
-        if size[k] > stored[k] {
-            Some(at[k].rem_euclid(n) as u32)
-        } else {
-            (0..n).contains(&at[k]).then_some(at[k] as u32)
+        // Most are inside: a division each would take most of the time.
+        match (0..n).contains(&at[k]) {
+            true => Some(at[k] as u32),
+            false if size[k] > stored[k] => Some(at[k].rem_euclid(n) as u32),
+            false => None,
         }
     };
     Some([axis(0)?, axis(1)?])
