@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::{Entry, Settings, Values};
+use cuesta::lod::{Entry, Setting, Settings, Values, Variant};
 use cuesta::view::{Containment, Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
@@ -15,27 +15,39 @@ pub struct Form {
     pub settings: Settings,
 }
 
-/// Every combination of an entry's variants and words, and for each number one far below its default: a length
-/// that suits real land shows nothing on these fields.
+/// Every combination of an entry's settings, and each variant with the default ones and with each single one: a
+/// variant changes how a list is submitted.
 pub fn forms(entry: &'static Entry) -> Vec<Form> {
     let mut choices: Vec<Vec<(String, String)>> = vec![Vec::new()];
     for setting in entry.settings {
-        let values: Vec<String> = match setting.values {
-            Values::Words(words) => words.iter().map(|word| word.to_string()).collect(),
-            Values::Number(low, _) => {
-                let default: f64 = setting.default.parse().expect("a number");
-                vec![(default / 25.0).max(low).to_string()]
-            }
-        };
         let with = |chosen: &Vec<(String, String)>| {
-            let key = setting.key.to_string();
             let chosen = chosen.clone();
-            values.clone().into_iter().map(move |value| [chosen.clone(), vec![(key.clone(), value)]].concat())
+            values(setting)
+                .into_iter()
+                .map(move |value| [chosen.clone(), vec![(setting.key.to_string(), value)]].concat())
         };
         choices = choices.iter().flat_map(with).collect();
     }
-    let variants = || [None].into_iter().chain(entry.variants.iter().map(|v| Some(v.name)));
-    choices.iter().flat_map(|choice| variants().map(move |variant| form(entry, variant, choice))).collect()
+    let whole = choices.iter().map(|choice| form(entry, None, choice));
+    let single = entry
+        .settings
+        .iter()
+        .flat_map(|setting| values(setting).into_iter().map(|value| vec![(setting.key.to_string(), value)]));
+    let single: Vec<_> = std::iter::once(Vec::new()).chain(single).collect();
+    let of_variant = |variant: &'static Variant| single.iter().map(|choice| form(entry, Some(variant.name), choice));
+    whole.chain(entry.variants.iter().flat_map(of_variant)).collect()
+}
+
+/// The values that a setting is tried at: every word, and for a number one far below its default, since a length
+/// that suits real land shows nothing on these fields.
+fn values(setting: &Setting) -> Vec<String> {
+    match setting.values {
+        Values::Words(words) => words.iter().map(|word| word.to_string()).collect(),
+        Values::Number(low, _) => {
+            let default: f64 = setting.default.parse().expect("a number");
+            vec![(default / 25.0).max(low).to_string()]
+        }
+    }
 }
 
 fn form(entry: &'static Entry, variant: Option<&str>, choices: &[(String, String)]) -> Form {
