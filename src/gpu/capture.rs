@@ -11,6 +11,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
+use super::bindings::{Bindings, Bound};
 use super::device::Gpu;
 use super::frames::Recording;
 use super::memory::{Buffer, memory_barrier};
@@ -48,11 +49,8 @@ impl Part {
 /// Pipelines and the buffer.
 pub struct Capture {
     gpu: Arc<Gpu>,
-    set_layout: vk::DescriptorSetLayout,
-    layout: vk::PipelineLayout,
+    bindings: Bindings,
     pipelines: BTreeMap<(Source, Topology), vk::Pipeline>,
-    descriptors: vk::DescriptorPool,
-    set: vk::DescriptorSet,
     /// The records: an array of [`Captured`].
     pub buffer: Buffer,
 }
@@ -66,38 +64,12 @@ impl Capture {
         let bytes = (RECORDS * size_of::<Captured>()) as u64;
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let buffer = Buffer::new(gpu, "captured vertices", bytes, usage, MemoryLocation::GpuToCpu)?;
-        let kind = vk::DescriptorType::STORAGE_BUFFER;
-        let binding = [vk::DescriptorSetLayoutBinding::default()
-            .descriptor_type(kind)
-            .descriptor_count(1)
-            .stage_flags(vk::ShaderStageFlags::VERTEX)];
-        // SAFETY: the device is alive; Drop destroys what is made here.
-        let mut capture = unsafe {
-            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&binding);
-            let set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
-            let sets = [scene, set_layout];
-            let constants = [vk::PushConstantRange {
-                stage_flags: vk::ShaderStageFlags::VERTEX,
-                offset: 0,
-                size: size_of::<CapturedPart>() as u32,
-            }];
-            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&constants);
-            let layout = gpu.raw.create_pipeline_layout(&info, None)?;
-            let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: 1 }];
-            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-            let descriptors = gpu.raw.create_descriptor_pool(&info, None)?;
-            let sets = [set_layout];
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&sets);
-            let set = gpu.raw.allocate_descriptor_sets(&info)?[0];
-            let whole = [vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }];
-            let write = vk::WriteDescriptorSet::default().dst_set(set).descriptor_type(kind).buffer_info(&whole);
-            gpu.raw.update_descriptor_sets(&[write], &[]);
-            let (gpu, pipelines) = (Arc::clone(gpu), BTreeMap::new());
-            Self { gpu, set_layout, layout, pipelines, descriptors, set, buffer }
-        };
+        let (bound, constants) = ([Bound::Storage(&buffer)], size_of::<CapturedPart>());
+        let bindings = Bindings::new(gpu, "capture", Some(scene), vk::ShaderStageFlags::VERTEX, &bound, constants)?;
+        let mut capture = Self { gpu: Arc::clone(gpu), bindings, pipelines: BTreeMap::new(), buffer };
         for source in [Source::Lattice, Source::Resident] {
             for topology in [Topology::Triangles, Topology::Strip] {
-                let pipeline = pipelines::terrain(gpu, capture.layout, plan, Pass::Capture, source, topology)?;
+                let pipeline = pipelines::terrain(gpu, capture.bindings.layout, plan, Pass::Capture, source, topology)?;
                 capture.pipelines.insert((source, topology), pipeline);
             }
         }
@@ -153,14 +125,14 @@ impl Capture {
                 raw.cmd_begin_rendering(commands, &info);
                 raw.cmd_set_viewport(commands, 0, &viewport);
                 raw.cmd_set_scissor(commands, 0, &[area]);
-                let sets = [terrain.scene_set(r), self.set];
-                raw.cmd_bind_descriptor_sets(commands, graphics, self.layout, 0, &sets, &[]);
+                let (sets, layout) = ([terrain.scene_set(r), self.bindings.set], self.bindings.layout);
+                raw.cmd_bind_descriptor_sets(commands, graphics, layout, 0, &sets, &[]);
                 for Part { draw, place } in batch {
                     let source = if draw.source == Source::Streamed { Source::Resident } else { draw.source };
                     raw.cmd_bind_pipeline(commands, graphics, self.pipelines[&(source, draw.topology)]);
                     terrain.bind_geometry(r, draw.source);
                     let stage = vk::ShaderStageFlags::VERTEX;
-                    raw.cmd_push_constants(commands, self.layout, stage, 0, bytemuck::bytes_of(place));
+                    raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(place));
                     let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
                     let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
                     raw.cmd_draw_indexed(commands, indices, instances, first_index, 0, first_instance);
@@ -201,9 +173,6 @@ impl Drop for Capture {
             for pipeline in self.pipelines.values() {
                 self.gpu.raw.destroy_pipeline(*pipeline, None);
             }
-            self.gpu.raw.destroy_pipeline_layout(self.layout, None);
-            self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
-            self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);
         }
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use ash::vk;
 
+use super::bindings::{Bindings, Bound};
 use super::device::Gpu;
 use super::frames::Recording;
 use super::memory::barriers;
@@ -18,49 +19,21 @@ use crate::plan::ScenePlan;
 /// What the pass needs.
 pub struct Floor {
     gpu: Arc<Gpu>,
-    set_layout: vk::DescriptorSetLayout,
-    layout: vk::PipelineLayout,
+    bindings: Bindings,
     pipeline: vk::Pipeline,
-    descriptors: vk::DescriptorPool,
-    set: vk::DescriptorSet,
     sampler: vk::Sampler,
 }
 
 impl Floor {
     /// Makes the pass for a scene, whose descriptors have the layout `scene`, over pictures of this target.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout, target: &Offscreen) -> Result<Self> {
-        let kind = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
-        let binding = [vk::DescriptorSetLayoutBinding::default()
-            .descriptor_type(kind)
-            .descriptor_count(1)
-            .stage_flags(vk::ShaderStageFlags::FRAGMENT)];
         let sampler = pages::sampler(gpu, Sampling::Texels)?;
-        // SAFETY: the device is alive; Drop destroys what is made here; the depth image outlives the floor.
-        let mut floor = unsafe {
-            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&binding);
-            let set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
-            let sets = [scene, set_layout];
-            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-            let layout = gpu.raw.create_pipeline_layout(&info, None)?;
-            let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: 1 }];
-            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-            let descriptors = gpu.raw.create_descriptor_pool(&info, None)?;
-            let sets = [set_layout];
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&sets);
-            let set = gpu.raw.allocate_descriptor_sets(&info)?[0];
-            let image = [vk::DescriptorImageInfo {
-                sampler,
-                image_view: target.depth.view,
-                image_layout: vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL,
-            }];
-            let write = vk::WriteDescriptorSet::default().dst_set(set).descriptor_type(kind).image_info(&image);
-            gpu.raw.update_descriptor_sets(&[write], &[]);
-            let (gpu, pipeline) = (Arc::clone(gpu), vk::Pipeline::null());
-            Self { gpu, set_layout, layout, pipeline, descriptors, set, sampler }
-        };
+        let depth = Bound::Texture(sampler, target.depth.view, vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL);
+        let bindings = Bindings::new(gpu, "floor", Some(scene), vk::ShaderStageFlags::FRAGMENT, &[depth], 0)?;
+        let mut floor = Self { gpu: Arc::clone(gpu), bindings, pipeline: vk::Pipeline::null(), sampler };
         floor.pipeline = pipelines::make(
             gpu,
-            floor.layout,
+            floor.bindings.layout,
             Description {
                 name: "floor",
                 vertex: "floor.vert",
@@ -89,9 +62,9 @@ impl Floor {
             // SAFETY: pipeline and sets outlive the frame; three vertices without input.
             unsafe {
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, self.pipeline);
-                let sets = [scene, self.set];
+                let sets = [scene, self.bindings.set];
                 let graphics = vk::PipelineBindPoint::GRAPHICS;
-                raw.cmd_bind_descriptor_sets(commands, graphics, self.layout, 0, &sets, &[]);
+                raw.cmd_bind_descriptor_sets(commands, graphics, self.bindings.layout, 0, &sets, &[]);
                 raw.cmd_draw(commands, 3, 1, 0, 0);
             }
             Ok(())
@@ -108,9 +81,6 @@ impl Drop for Floor {
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
             self.gpu.raw.destroy_pipeline(self.pipeline, None);
-            self.gpu.raw.destroy_pipeline_layout(self.layout, None);
-            self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
-            self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);
             self.gpu.raw.destroy_sampler(self.sampler, None);
         }
     }

@@ -4,6 +4,7 @@
 //! steps. Everything is made at start; nothing is created inside a frame.
 #![allow(unsafe_code)]
 
+mod bindings;
 pub mod capture;
 pub mod clock;
 pub mod device;

@@ -7,11 +7,13 @@ use anyhow::Result;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
+use super::bindings::{Bindings, Bound};
 use super::capture::Capture;
 use super::device::Gpu;
 use super::frames::Recording;
 use super::memory::{Buffer, memory_barrier};
-use super::shaders::{self, Constants};
+use super::pipelines;
+use super::shaders::Constants;
 use crate::draw::layout::{OracleInput, TriangleError};
 use crate::plan::ScenePlan;
 
@@ -38,11 +40,8 @@ pub struct Summary {
 /// Pipeline and buffers.
 pub struct Oracle {
     gpu: Arc<Gpu>,
-    set_layout: vk::DescriptorSetLayout,
-    layout: vk::PipelineLayout,
+    bindings: Bindings,
     pipeline: vk::Pipeline,
-    descriptors: vk::DescriptorPool,
-    set: vk::DescriptorSet,
     triangles: Buffer,
     errors: Buffer,
     histogram: Buffer,
@@ -67,54 +66,12 @@ impl Oracle {
         let back = |purpose, bytes: usize| Buffer::new(gpu, purpose, bytes as u64, usage, MemoryLocation::GpuToCpu);
         let errors = back("triangle errors", TRIANGLES * size_of::<TriangleError>())?;
         let histogram = back("error histogram", HISTOGRAM)?;
-        let kind = vk::DescriptorType::STORAGE_BUFFER;
-        let bindings = [0, 1, 2, 3].map(|binding| {
-            vk::DescriptorSetLayoutBinding::default()
-                .binding(binding)
-                .descriptor_type(kind)
-                .descriptor_count(1)
-                .stage_flags(vk::ShaderStageFlags::COMPUTE)
-        });
-        let buffers = [capture.buffer.raw, triangles.raw, errors.raw, histogram.raw];
-        // SAFETY: the device is alive; Drop destroys what is made here; the capture outlives the oracle's use.
-        unsafe {
-            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-            let set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
-            let sets = [scene, set_layout];
-            let constants = [vk::PushConstantRange {
-                stage_flags: vk::ShaderStageFlags::COMPUTE,
-                offset: 0,
-                size: size_of::<OracleInput>() as u32,
-            }];
-            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&constants);
-            let layout = gpu.raw.create_pipeline_layout(&info, None)?;
-            let sizes = [vk::DescriptorPoolSize { ty: kind, descriptor_count: 4 }];
-            let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-            let descriptors = gpu.raw.create_descriptor_pool(&info, None)?;
-            let sets = [set_layout];
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(descriptors).set_layouts(&sets);
-            let set = gpu.raw.allocate_descriptor_sets(&info)?[0];
-            let infos = buffers.map(|buffer| [vk::DescriptorBufferInfo { buffer, offset: 0, range: vk::WHOLE_SIZE }]);
-            let write = vk::WriteDescriptorSet::default().dst_set(set).descriptor_type(kind);
-            let writes: Vec<_> =
-                (0u32..).zip(&infos).map(|(binding, info)| write.dst_binding(binding).buffer_info(info)).collect();
-            gpu.raw.update_descriptor_sets(&writes, &[]);
-            let module = shaders::module(gpu, "oracle.comp")?;
-            let constants = Constants::of(plan);
-            let special = constants.info();
-            let stage = vk::PipelineShaderStageCreateInfo::default()
-                .stage(vk::ShaderStageFlags::COMPUTE)
-                .module(module)
-                .name(c"main")
-                .specialization_info(&special);
-            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-            let made = gpu.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None);
-            gpu.raw.destroy_shader_module(module, None);
-            let pipeline = made.map_err(|(_, e)| e)?[0];
-            gpu.name(pipeline, "oracle");
-            let (gpu, sums) = (Arc::clone(gpu), Sums::default());
-            Ok(Self { gpu, set_layout, layout, pipeline, descriptors, set, triangles, errors, histogram, sums })
-        }
+        let bound = [&capture.buffer, &triangles, &errors, &histogram].map(Bound::Storage);
+        let constants = size_of::<OracleInput>();
+        let bindings = Bindings::new(gpu, "oracle", Some(scene), vk::ShaderStageFlags::COMPUTE, &bound, constants)?;
+        let pipeline = pipelines::compute(gpu, bindings.layout, "oracle", "oracle.comp", &Constants::of(plan))?;
+        let (gpu, sums) = (Arc::clone(gpu), Sums::default());
+        Ok(Self { gpu, bindings, pipeline, triangles, errors, histogram, sums })
     }
 
     /// Forgets what was found.
@@ -134,7 +91,7 @@ impl Oracle {
         self.triangles.write(0, bytemuck::cast_slice(triangles));
         self.histogram.write(0, &[0; HISTOGRAM]);
         let given = OracleInput { half_size: size.map(|n| n as f32 / 2.0), triangles: triangles.len() as u32 };
-        let (layout, set, pipeline) = (self.layout, self.set, self.pipeline);
+        let (layout, set, pipeline) = (self.bindings.layout, self.bindings.set, self.pipeline);
         recording.scope("oracle", |r| {
             let (raw, commands, point) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::COMPUTE);
             // SAFETY: what is bound outlives the frame.
@@ -199,9 +156,6 @@ impl Drop for Oracle {
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
             self.gpu.raw.destroy_pipeline(self.pipeline, None);
-            self.gpu.raw.destroy_pipeline_layout(self.layout, None);
-            self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
-            self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);
         }
     }
 }

@@ -205,6 +205,33 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
     Ok(pipeline)
 }
 
+/// Makes a compute pipeline.
+pub(super) fn compute(
+    gpu: &Arc<Gpu>,
+    layout: vk::PipelineLayout,
+    name: &str,
+    shader: &str,
+    constants: &Constants,
+) -> Result<vk::Pipeline> {
+    let module = shaders::module(gpu, shader)?;
+    let special = constants.info();
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(vk::ShaderStageFlags::COMPUTE)
+        .module(module)
+        .name(c"main")
+        .specialization_info(&special);
+    let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+    // SAFETY: all that the info points to lives here; the module may go once the pipeline is made.
+    let made = unsafe {
+        let made = gpu.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None);
+        gpu.raw.destroy_shader_module(module, None);
+        made
+    };
+    let pipeline = made.map_err(|(_, e)| e).with_context(|| format!("pipeline {name}"))?[0];
+    gpu.name(pipeline, name);
+    Ok(pipeline)
+}
+
 /// What distinguishes one pipeline from another.
 pub(super) struct Description<'a> {
     pub name: &'static str,

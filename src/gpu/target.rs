@@ -62,16 +62,19 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
     let depth_access = Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
     // After the picture's last use: presented, or copied out.
     let colour_used = (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED);
-    let mut before = vec![image_barrier(colour.image, colour.format, colour_used, colour_write)];
-    before.extend(depth.map(|(image, _)| {
-        // And the depth's: tested, copied out, or read by a pass of its own.
-        let used = tests | Stage::COPY | Stage::FRAGMENT_SHADER;
-        image.barrier(
-            (used, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
-            (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
-        )
-    }));
-    barriers(gpu, commands, &before);
+    let before = image_barrier(colour.image, colour.format, colour_used, colour_write);
+    match depth {
+        None => barriers(gpu, commands, &[before]),
+        Some((image, _)) => {
+            // And the depth's: tested, copied out, or read by a pass of its own.
+            let used = tests | Stage::COPY | Stage::FRAGMENT_SHADER;
+            let depth_before = image.barrier(
+                (used, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
+                (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
+            );
+            barriers(gpu, commands, &[before, depth_before]);
+        }
+    }
     let clear = vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } };
     let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
     let colours = [vk::RenderingAttachmentInfo::default()

@@ -151,25 +151,41 @@ impl Section {
 pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32 {
     // Half an edge; once around a tiled axis changes nothing.
     let [a, b] = [0, 1].map(|k| {
-        let half = 1i64 << (level - 1);
-        if field.size()[k] > field.stored()[k] { half % i64::from(field.stored()[k]) } else { half }
+        let (half, stored) = (1i64 << (level - 1), i64::from(field.stored()[k]));
+        // Outside is outside, however far.
+        if field.size()[k] > field.stored()[k] { half % stored } else { half.min(stored) }
     });
+    let length = side[0] as usize + 1;
     let row = |z: u32| {
-        let sample = |x: i64, z: i64| wrapped(field, [x, z]).map(|[x, z]| f64::from(field.height(x, z)));
-        let mut largest = 0.0f64;
-        for x in first[0]..=first[0] + side[0] {
-            let [x, z] = [i64::from(x), i64::from(z)];
-            let Some(middle) = sample(x, z) else { continue };
-            for [dx, dz] in [[a, 0], [0, b], [a, b], [a, -b]] {
-                if let (Some(before), Some(after)) = (sample(x - dx, z - dz), sample(x + dx, z + dz)) {
-                    largest = largest.max((middle - (before + after) / 2.0).abs());
-                }
-            }
-        }
-        largest
+        let from = i64::from(first[0]) - a;
+        let [before, here, after] =
+            [-b, 0, b].map(|dz| heights(field, from, i64::from(z) + dz, length + 2 * a as usize));
+        // One, two or three rows, from their first, middle or last third on.
+        let part = |row: usize, third: usize| &[&before, &here, &after][row][third * a as usize..][..length];
+        let ends = [[(1, 0), (1, 2)], [(0, 1), (2, 1)], [(0, 0), (2, 2)], [(2, 0), (0, 2)]];
+        let bends = ends.map(|ends| ends.map(|(row, third)| part(row, third)));
+        bends.into_iter().map(|[from, to]| largest_bend(part(1, 1), from, to)).fold(0.0, f64::max)
     };
     let largest = (first[1]..=first[1] + side[1]).into_par_iter().map(row).reduce(|| 0.0, f64::max);
     (largest as f32).next_up() * f32::from(largest > 0.0)
+}
+
+/// The largest distance of a height from the mean of two others, where all three are numbers.
+fn largest_bend(middle: &[f64], from: &[f64], to: &[f64]) -> f64 {
+    let mut largest = 0.0f64;
+    for ((middle, from), to) in middle.iter().zip(from).zip(to) {
+        let bend = (middle - (from + to) / 2.0).abs();
+        if bend > largest {
+            largest = bend;
+        }
+    }
+    largest
+}
+
+/// Heights along a row of the field repeated without end along its tiled axes; no numbers outside.
+fn heights(field: &Field, first: i64, z: i64, count: usize) -> Vec<f64> {
+    let height = |at| wrapped(field, at).map_or(f64::NAN, |[x, z]| f64::from(field.height(x, z)));
+    (first..).take(count).map(|x| height([x, z])).collect()
 }
 
 /// The stored sample at a position of the field repeated without end along its tiled axes; `None` outside.
