@@ -65,8 +65,8 @@ pub struct MeasureArgs {
     /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub technique: Vec<String>,
-    /// A setting, for every technique that has it; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = super::scene::key_value)]
+    /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
+    #[arg(long = "set", value_name = "KEY=V,…", value_parser = super::scene::key_value)]
     pub settings: Vec<(String, String)>,
     /// Errors allowed, pixels.
     #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]

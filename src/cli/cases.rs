@@ -54,6 +54,7 @@ pub fn path_help() -> String {
 }
 
 /// One technique as it was asked for.
+#[derive(Clone)]
 struct Asked {
     technique: String,
     settings: BTreeMap<String, String>,
@@ -97,7 +98,7 @@ fn techniques(args: &MeasureArgs) -> Result<Vec<Asked>> {
         let has = |name: &String| entry(name).is_ok_and(|(entry, _)| entry.settings.iter().any(|s| s.key == key));
         ensure!(names.iter().any(has), "--set {key}: no technique of this run has this setting");
     }
-    names.iter().map(|name| asked(name, &args.settings)).collect()
+    Ok(names.iter().map(|name| asked(name, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
 fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
@@ -109,12 +110,19 @@ fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
     Ok((entry, variant))
 }
 
-fn asked(name: &str, choices: &[(String, String)]) -> Result<Asked> {
+/// A technique once with each combination of the values of its settings.
+fn asked(name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
     let (entry, variant) = entry(name)?;
-    let has = |key: &str| entry.settings.iter().any(|setting| setting.key == key);
-    let own: Vec<_> = choices.iter().filter(|(key, _)| has(key)).cloned().collect();
-    Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
-    Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
+    let mut all = vec![Vec::new()];
+    for (key, values) in choices.iter().filter(|(key, _)| entry.settings.iter().any(|setting| setting.key == key)) {
+        let with = |own: &Vec<(String, String)>, value: &str| [&own[..], &[(key.clone(), value.to_string())]].concat();
+        all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
+    }
+    let checked = |own: Vec<(String, String)>| {
+        Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
+        Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
+    };
+    all.into_iter().map(checked).collect()
 }
 
 fn of_kit(

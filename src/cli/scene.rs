@@ -56,6 +56,9 @@ pub struct ReadArgs {
     /// Files that claim more samples are refused.
     #[arg(long, value_name = "N", default_value_t = 1 << 30)]
     pub max_samples: u64,
+    /// Keep nothing beside a large file of what took long to work out of it.
+    #[arg(long)]
+    pub no_cache: bool,
 }
 
 /// Where the eye is and how it projects.
@@ -227,11 +230,12 @@ impl ReadArgs {
             max_samples: self.max_samples,
         };
         let _spinner = report::spinner(common, format!("reading {terrain}"));
-        let loaded = if is_demo(terrain) {
+        let mut loaded = if is_demo(terrain) {
             load_bytes("demo", demo::PICTURE, &demo_options(options))?
         } else {
             load(Path::new(terrain), &options)?
         };
+        loaded.field.source = (!self.no_cache && !is_demo(terrain)).then(|| terrain.into());
         for warning in &loaded.warnings {
             report::warn(common, warning);
         }

@@ -9,12 +9,16 @@
 use rayon::prelude::*;
 
 use super::Field;
+use super::kept::Kept;
 use super::levels::{self, Patch};
 use super::surface;
 
 /// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
 /// the two steps of `draw::place::lattice_height`.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// Fields with fewer stored samples are measured in a moment: nothing is kept.
+const KEPT_FROM: u64 = 1 << 23;
 
 /// What is to be measured.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +34,8 @@ pub struct Measure {
 }
 
 /// One square.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Square {
     /// The largest distance, metres, of its surface from the samples, holes excepted: with any of its sides one
     /// level coarser too, and at least `growth` times that of the squares in it. 0 at level 0, where only a coarser side
@@ -55,6 +60,15 @@ struct Level {
     squares: Vec<Square>,
 }
 
+impl Measure {
+    /// A name for what is measured, in file names.
+    fn name(&self) -> String {
+        let Self { cells, growth, errors, morph } = self;
+        let what = if *errors { "errors" } else { "ranges" };
+        format!("{what}-{cells}x{growth}{}", if *morph { "-morph" } else { "" })
+    }
+}
+
 impl Square {
     const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
 
@@ -70,20 +84,54 @@ impl Square {
 }
 
 impl Bounds {
-    /// Measures a field, in parallel.
+    /// Measures a field, in parallel, or finds what was kept when it was measured before.
     pub fn new(field: &Field, measure: Measure) -> Self {
         let (stored, size) = (field.stored(), field.size());
         let period = [0, 1].map(|k| (size[k] > stored[k]).then_some(stored[k]));
         let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new() };
-        let longest = size[0].max(size[1]) - 1;
-        let mut level = 0;
-        loop {
-            bounds.add_level(field, level);
-            if measure.cells << level >= longest {
+        bounds.lay_out(size[0].max(size[1]) - 1);
+        let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
+        let kept = is_large.then(|| Kept::new(field, &measure.name())).flatten();
+        if let Some(content) = kept.as_ref().and_then(Kept::read) {
+            if bounds.fill(&content) {
                 return bounds;
             }
-            level += 1;
         }
+        (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level));
+        kept.inspect(|kept| kept.write(&bounds.content()));
+        bounds
+    }
+
+    /// Makes the levels, unmeasured, up to the one whose square is as long as the field.
+    fn lay_out(&mut self, longest: u32) {
+        loop {
+            let side = self.side(self.levels());
+            let count = [0, 1].map(|k| self.period[k].unwrap_or(self.last[k]).div_ceil(side));
+            let squares = vec![Square::NOTHING; (count[0] * count[1]) as usize];
+            self.levels.push(Level { side, count, squares });
+            if side >= longest {
+                return;
+            }
+        }
+    }
+
+    /// All squares, level by level.
+    fn content(&self) -> Vec<u8> {
+        self.levels.iter().flat_map(|level| bytemuck::cast_slice::<_, u8>(&level.squares).iter().copied()).collect()
+    }
+
+    /// Takes all squares from what [`Self::content`] made; `false` if that was another layout.
+    fn fill(&mut self, content: &[u8]) -> bool {
+        if content.len() != self.bytes() {
+            return false;
+        }
+        let mut rest = content;
+        for level in &mut self.levels {
+            let (own, after) = rest.split_at(size_of_val(level.squares.as_slice()));
+            bytemuck::cast_slice_mut(&mut level.squares).copy_from_slice(own);
+            rest = after;
+        }
+        true
     }
 
     /// How many levels there are; one square of the last holds the field.
@@ -132,16 +180,13 @@ impl Bounds {
         all
     }
 
-    fn add_level(&mut self, field: &Field, level: u32) {
-        let side = self.side(level);
-        let extent = [0, 1].map(|k| self.period[k].unwrap_or(self.last[k]));
-        let count = extent.map(|n| n.div_ceil(side));
+    fn measure_level(&mut self, field: &Field, level: u32) {
+        let Level { side, count, .. } = self.levels[level as usize];
         let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
             let first = [k % count[0], k / count[0]].map(|n| n * side);
             self.measured(field, level, first)
         });
-        let squares = squares.collect();
-        self.levels.push(Level { side, count, squares });
+        self.levels[level as usize].squares = squares.collect();
     }
 
     fn measured(&self, field: &Field, level: u32, first: [u32; 2]) -> Square {
@@ -284,6 +329,20 @@ mod tests {
             let error = bounds.square(level, at).error;
             assert!((error - slow).abs() <= 1e-5 * slow, "level {level} at {at:?}: {error} m, slowly {slow} m");
         }
+    }
+
+    #[test]
+    fn what_was_kept_is_what_was_measured() {
+        let bounds = Bounds::new(&rough([75, 52], 3), MEASURE);
+        let content = bounds.content();
+        let mut again = Bounds::new(&rough([75, 52], 4), MEASURE);
+        assert_ne!(again.content(), content);
+        assert!(again.fill(&content));
+        squares(&bounds)
+            .into_iter()
+            .for_each(|(level, at)| assert_eq!(again.square(level, at), bounds.square(level, at)));
+        assert!(!again.fill(&content[..content.len() - 1]));
+        assert!(!Bounds::new(&rough([75, 152], 3), MEASURE).fill(&content));
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
+mod kept;
 pub mod levels;
 mod load;
 mod png;
@@ -29,6 +30,8 @@ mod usgs_dem;
 pub use georef::metres_per_degree;
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
 pub use sample::{Order, SampleType};
+
+use std::path::PathBuf;
 
 use glam::DVec3;
 
@@ -139,6 +142,11 @@ impl Holes {
         self.words[k / 64] >> (k % 64) & 1 != 0
     }
 
+    /// One bit a sample.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+
     /// How many samples are holes.
     pub fn count(&self) -> u64 {
         self.count
@@ -161,6 +169,8 @@ pub struct Field {
     pub origin: [f64; 2],
     /// Coordinate reference system, as the file names it.
     pub crs: Option<String>,
+    /// The file that it was read from, if what takes long to work out of it may be kept beside that.
+    pub source: Option<PathBuf>,
 }
 
 /// Lowest, highest and mean height of the samples that are no holes, metres.
@@ -183,8 +193,8 @@ impl Field {
         assert!(x_count >= 2 && z_count >= 2, "a field has at least 2 × 2 samples");
         assert_eq!(samples.len(), x_count as usize * z_count as usize);
         assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
-        let mut field =
-            Self { samples, holes, stored: [x_count, z_count], tiles: [1, 1], spacing, origin: [0.0, 0.0], crs: None };
+        let (stored, tiles, origin) = ([x_count, z_count], [1, 1], [0.0, 0.0]);
+        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs: None, source: None };
         field.fill_holes();
         field
     }
@@ -318,7 +328,7 @@ impl Field {
         };
         let mut holes = Holes::none(self.samples.len());
         (0..self.samples.len()).filter(|&k| !near(k)).for_each(|k| holes.insert(k));
-        Field { holes, ..self.clone() }
+        Field { holes, source: None, ..self.clone() }
     }
 
     /// Fills the samples under holes by push-pull: means of the known samples on ever coarser grids, then

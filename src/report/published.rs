@@ -31,15 +31,16 @@ pub struct Published {
 pub struct PublishedRow {
     /// As published.
     pub cells: Vec<String>,
-    /// Which of our cases stands beside it.
+    /// Which of our cases stand beside it.
     #[serde(default)]
-    pub ours: Option<Rule>,
+    pub ours: Vec<Rule>,
 }
 
 /// What a case must be like to stand beside a published row; of several the fastest does.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rule {
+    /// With its variant; without one, its default form.
     technique: Option<String>,
     settings: BTreeMap<String, String>,
     tolerance_px: Option<f64>,
@@ -58,9 +59,8 @@ pub fn tables() -> Vec<Published> {
 impl Rule {
     fn allows(&self, result: &CaseResult) -> bool {
         let case = &result.case;
-        let technique = case.technique.split(':').next().unwrap_or_default();
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
-        self.technique.as_deref().is_none_or(|name| name == technique)
+        self.technique.as_deref().is_none_or(|name| name == case.technique)
             && self.settings.iter().all(|(key, value)| case.settings.get(key) == Some(value))
             && self.tolerance_px.is_none_or(|px| px == case.tolerance_px)
             && self.terrain.as_deref().is_none_or(|name| name == case.terrain.name)
@@ -79,12 +79,13 @@ impl Rule {
         let error = peers
             .map_or(String::new(), |p| format!("; peers' metric mean {}, p99 {} px", number(p.mean), number(p.p99)));
         Some(format!(
-            "{} {} px: {} ms ({} fps), {} triangles, {} draws{error}",
+            "{} {} px: {} ms ({} fps), {} triangles ({} a second), {} draws{error}",
             result.case.series(),
             number(result.case.tolerance_px),
             number(frame_ms),
             number(1000.0 / frame_ms),
             number(time.triangles),
+            number(time.triangles * 1000.0 / frame_ms),
             number(time.draws)
         ))
     }

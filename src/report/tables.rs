@@ -102,12 +102,11 @@ pub fn published(results: &Results) -> String {
     for published in published::tables() {
         let columns: Vec<String> = published.columns.iter().cloned().chain(["here".to_string()]).collect();
         let row = |row: &published::PublishedRow| {
-            let ours = match &row.ours {
-                None => "<span class=\"absent\">nothing of ours compares</span>".to_string(),
-                Some(rule) => rule.ours(results).map_or_else(
-                    || "<span class=\"absent\">not in this run</span>".to_string(),
-                    |ours| format!("<strong>{}</strong>", escape(&ours)),
-                ),
+            let found: Vec<_> = row.ours.iter().filter_map(|rule| rule.ours(results)).collect();
+            let ours = match found[..] {
+                [] if row.ours.is_empty() => "<span class=\"absent\">nothing of ours compares</span>".to_string(),
+                [] => "<span class=\"absent\">not in this run</span>".to_string(),
+                _ => format!("<strong>{}</strong>", escape(&found.join("\n")).replace('\n', "<br>")),
             };
             row.cells.iter().map(|cell| escape(cell)).chain([ours]).collect()
         };

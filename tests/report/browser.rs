@@ -217,8 +217,9 @@ fn techniques_axes_and_scenes_are_chosen(browser: &mut Browser) {
 
 /// The tab key goes to the controls and the points; a point in focus shows its value, Escape hides it.
 fn keys_are_enough(browser: &mut Browser) {
-    browser.ask("document.activeElement.blur()");
-    browser.ask("scrollTo(0, 0)");
+    // Where the first Tab begins is the browser's choice after a pointer was there: it is to be the page's start.
+    browser.ask("document.body.tabIndex = -1");
+    browser.ask("document.body.focus()");
     let focus =
         "document.activeElement.id || document.activeElement.getAttribute('class') || document.activeElement.type";
     let mut reached = Vec::new();
