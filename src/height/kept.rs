@@ -4,7 +4,7 @@
 //! short or damaged is worked out again. It is a convenience: where it cannot be written, nothing is kept.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -68,6 +68,8 @@ fn key(field: &Field) -> u128 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
+
     use crate::height::Holes;
 
     fn field(source: &Path, heights: [f32; 4]) -> Field {

@@ -172,33 +172,81 @@ pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32
 
 /// The largest distance of a height from the mean of two others, where all three are numbers.
 fn largest_bend(middle: &[f64], from: &[f64], to: &[f64]) -> f64 {
-    let mut largest = 0.0f64;
+    let bend = |middle: f64, from: f64, to: f64| (middle - (from + to) / 2.0).abs();
+    let [(middle, last_middle), (from, last_from), (to, last_to)] = [middle, from, to].map(|row| row.as_chunks::<8>());
+    // As many maxima side by side as fill the widest registers.
+    let mut largest = [0.0f64; 8];
     for ((middle, from), to) in middle.iter().zip(from).zip(to) {
-        let bend = (middle - (from + to) / 2.0).abs();
-        if bend > largest {
-            largest = bend;
+        for (lane, largest) in largest.iter_mut().enumerate() {
+            let bend = bend(middle[lane], from[lane], to[lane]);
+            *largest = if bend > *largest { bend } else { *largest };
         }
     }
-    largest
+    let last = last_middle.iter().zip(last_from).zip(last_to).map(|((middle, from), to)| bend(*middle, *from, *to));
+    last.chain(largest).fold(0.0, f64::max)
 }
 
 /// Heights along a row of the field repeated without end along its tiled axes; no numbers outside.
 fn heights(field: &Field, first: i64, z: i64, count: usize) -> Vec<f64> {
-    let height = |at| wrapped(field, at).map_or(f64::NAN, |[x, z]| f64::from(field.height(x, z)));
-    (first..).take(count).map(|x| height([x, z])).collect()
+    let Some(z) = wrapped(field, 1, z) else { return vec![f64::NAN; count] };
+    let width = field.stored()[0] as usize;
+    let mut row = Vec::with_capacity(count);
+    while row.len() < count {
+        let (x, left) = (first + row.len() as i64, count - row.len());
+        match wrapped(field, 0, x) {
+            Some(x) => field.samples().append(z * width + x..z * width + (x + left).min(width), &mut row),
+            None => row.resize(row.len() + if x < 0 { left.min(-x as usize) } else { left }, f64::NAN),
+        }
+    }
+    row
 }
 
-/// The stored sample at a position of the field repeated without end along its tiled axes; `None` outside.
-fn wrapped(field: &Field, at: [i64; 2]) -> Option<[u32; 2]> {
-    let (stored, size) = (field.stored(), field.size());
-    let axis = |k: usize| {
-        let n = i64::from(stored[k]);
-        // Most are inside: a division each would take most of the time.
-        match (0..n).contains(&at[k]) {
-            true => Some(at[k] as u32),
-            false if size[k] > stored[k] => Some(at[k].rem_euclid(n) as u32),
-            false => None,
+/// The stored place along an axis of a place on the field repeated without end if it is tiled; `None` outside.
+fn wrapped(field: &Field, axis: usize, at: i64) -> Option<usize> {
+    let count = i64::from(field.stored()[axis]);
+    let is_tiled = field.size()[axis] > field.stored()[axis];
+    (is_tiled || (0..count).contains(&at)).then(|| at.rem_euclid(count) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    /// As [`detail`] is defined, sample by sample.
+    fn slow_detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f64 {
+        let height = |[x, z]: [i64; 2]| {
+            let place = [wrapped(field, 0, x)?, wrapped(field, 1, z)?].map(|n| n as u32);
+            Some(f64::from(field.height(place[0], place[1])))
+        };
+        let half = 1i64 << (level - 1);
+        let mut largest = 0.0f64;
+        for (i, j) in (0..=side[1]).flat_map(|j| (0..=side[0]).map(move |i| (i, j))) {
+            let at = [i64::from(first[0] + i), i64::from(first[1] + j)];
+            for a in [[half, 0], [0, half], [half, half], [half, -half]] {
+                let [before, after] = [-1, 1].map(|sign| height([at[0] + sign * a[0], at[1] + sign * a[1]]));
+                if let (Some(middle), Some(before), Some(after)) = (height(at), before, after) {
+                    largest = largest.max((middle - (before + after) / 2.0).abs());
+                }
+            }
         }
-    };
-    Some([axis(0)?, axis(1)?])
+        largest
+    }
+
+    #[test]
+    fn detail_is_what_it_is_defined_to_be() {
+        let [w, h] = [43, 29];
+        let codes = (0..w * h).map(|k| (k * 7919 % 1009) as u16).collect();
+        let field = Field::new(Samples::Coded { codes, zero: 3.0, scale: 0.25 }, [w, h], [1.0; 2], Holes::none(0));
+        for tiles in [[1, 1], [5, 1], [1, 5], [7, 7]] {
+            let field = field.clone().tiled(tiles);
+            for (level, (first, side)) in (1..8).flat_map(|level| {
+                [([0, 0], [16, 16]), ([16, 8], [9, 20]), ([0, 0], [42, 28])].map(|square| (level, square))
+            }) {
+                let (fast, slow) = (detail(&field, first, side, level), slow_detail(&field, first, side, level));
+                let next = (slow as f32).next_up() * f32::from(slow > 0.0);
+                assert_eq!(fast, next, "{tiles:?} level {level} at {first:?}");
+            }
+        }
+    }
 }

@@ -31,6 +31,7 @@ pub use georef::metres_per_degree;
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
 pub use sample::{Order, SampleType};
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use glam::DVec3;
@@ -96,6 +97,16 @@ impl Samples {
         match self {
             Samples::F32(heights) => heights[k],
             Samples::Coded { codes, zero, scale } => (f32::from(codes[k]) - zero) * scale,
+        }
+    }
+
+    /// Appends the heights of a range of samples, metres.
+    pub fn append(&self, range: Range<usize>, heights: &mut Vec<f64>) {
+        match self {
+            Samples::F32(samples) => heights.extend(samples[range].iter().map(|&h| f64::from(h))),
+            Samples::Coded { codes, zero, scale } => {
+                heights.extend(codes[range].iter().map(|&code| f64::from((f32::from(code) - zero) * scale)))
+            }
         }
     }
 
