@@ -343,6 +343,41 @@ mod with_a_device {
         assert_eq!(std::fs::read_dir(&out).unwrap().count(), 5, "nothing else is left there");
     }
 
+    /// The layer's best practices warn of what every tool does (naming objects, for one).
+    #[test]
+    fn a_validation_message_ends_with_exit_code_1() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let calls: [&[&str]; 3] = [
+            &["render", "demo", "-o", "a.png", "--size", "64x36"],
+            &["profile", "demo", "--out", "profile", "--size", "64x36", "--frames", "1"],
+            &[
+                "bench",
+                "demo",
+                "--out",
+                "bench",
+                "--size",
+                "64x36",
+                "--quick",
+                "--technique",
+                "geomipmap",
+                "--tolerance",
+                "9",
+            ],
+        ];
+        for arguments in calls {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+            command.env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT");
+            let output = command.args(arguments).args(["--validate", "--json"]).current_dir(folder.path()).output();
+            let output = output.expect("the program starts");
+            let document: Value = serde_json::from_str(&stdout(&output)).expect("one JSON document");
+            let messages = document["validation_messages"].as_array().map_or(0, Vec::len);
+            assert!(code(&output) == 1 && messages > 0, "{arguments:?}: exit code {}, {messages}", code(&output));
+        }
+    }
+
     #[test]
     fn profile_says_in_one_line_what_it_cannot_do() {
         if !has_device() {
