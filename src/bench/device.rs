@@ -174,8 +174,9 @@ fn look(
     drop(triangles);
     pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), view.tolerance.px);
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
-    pool.economy(&economy::economy(field, view, resident, &stage.list), fragments, covered);
-    pool.peers(field, view, &stage.depth());
+    let depth = stage.depth();
+    pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);
+    pool.peers(field, view, &depth);
     pool.hole_pixels(truth.hole_pixels(view, &picture).len());
     pool.picture(frame, &picture, &truth.picture)
 }

@@ -39,6 +39,7 @@ pub struct Pool {
     in_view: u64,
     sub_pixel: f64,
     shown: u64,
+    hidden: u64,
     sizes: Option<Histogram>,
     fragments: Option<u64>,
     covered: u64,
@@ -120,6 +121,7 @@ impl Pool {
     pub fn economy(&mut self, economy: &economy::Economy, fragments: Option<u64>, covered: u64) {
         self.in_view += economy.shown + economy.facing_away;
         self.shown += economy.shown;
+        self.hidden += economy.hidden;
         self.sub_pixel += economy.sub_pixel_share * economy.shown as f64;
         match &mut self.sizes {
             None => self.sizes = Some(economy.sizes_px.clone()),
@@ -182,6 +184,7 @@ impl Pool {
             skirt_pixels: Some(0),
             economy: self.sizes.as_ref().map(|sizes| Economy {
                 pixels_per_triangle: bins(sizes),
+                hidden_share: self.hidden as f64 / self.shown.max(1) as f64,
                 subpixel_share: self.sub_pixel / self.shown.max(1) as f64,
                 overdraw: self.fragments.and_then(|fragments| overdraw(fragments, self.covered)),
             }),

@@ -298,6 +298,9 @@ pub struct Bin {
 pub struct Economy {
     /// Triangles in view by their area in pixels.
     pub pixels_per_triangle: Vec<Bin>,
+    /// Share, 0 to 1, of triangles in view that land in front hides.
+    #[serde(default)]
+    pub hidden_share: f64,
     /// Share, 0 to 1, of triangles below one pixel.
     pub subpixel_share: f64,
     /// Fragments run per covered pixel.

@@ -1,12 +1,13 @@
 //! What triangles cost: how many there are, how many of them show, and how large they are on the screen.
 //!
 //! A triangle's size is the exact area of its projection, clipped to the picture; what other land hides of it
-//! is not taken off.
+//! is not taken off. Those that other land hides are counted apart ([`Depths`]).
 
 use glam::DVec4;
 use serde::{Deserialize, Serialize};
 
 use super::each_part;
+use super::hidden::Depths;
 use super::histogram::Histogram;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -31,6 +32,8 @@ pub struct Economy {
     pub facing_away: u64,
     /// The rest: at least partly in the picture, facing the eye.
     pub shown: u64,
+    /// Of the shown, those that land in front hides.
+    pub hidden: u64,
     /// Of the shown, the share with less than 1 px² in the picture; 0 if none is shown.
     pub sub_pixel_share: f64,
     /// Area of all shown triangles in the picture, pixels.
@@ -45,9 +48,9 @@ pub fn overdraw(fragments: u64, covered_pixels: u64) -> Option<f64> {
     (covered_pixels > 0).then(|| fragments as f64 / covered_pixels as f64)
 }
 
-/// Measures the triangles of a list.
-pub fn economy(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Economy {
-    let screen = Screen::new(field, view);
+/// Measures the triangles of a list; `depth` is what it left when it was drawn, one a pixel.
+pub fn economy(field: &Field, view: &View, resident: &Geometry, list: &DrawList, depth: &[f32]) -> Economy {
+    let screen = Screen::new(field, view, depth);
     let mut total = Economy::new();
     each_part(list, |part| screen.part(resident, list, part), |part| total.merge(&part));
     total.triangles = list.triangles();
@@ -65,6 +68,7 @@ impl Economy {
             outside: 0,
             facing_away: 0,
             shown: 0,
+            hidden: 0,
             sub_pixel_share: 0.0,
             area_px: 0.0,
             sizes_px: Histogram::new(BINS[0], BINS[1]),
@@ -80,16 +84,18 @@ impl Economy {
         self.outside += part.outside;
         self.facing_away += part.facing_away;
         self.shown += part.shown;
+        self.hidden += part.hidden;
         self.area_px += part.area_px;
         self.sizes_px.merge(&part.sizes_px);
     }
 
-    /// Counts a triangle by its signed area in the picture; `None` if it has no part in it.
-    fn add(&mut self, area_px: Option<f64>) {
-        match area_px {
+    /// Counts a triangle by its signed area in the picture and whether it is hidden; `None` if it has no part in it.
+    fn add(&mut self, seen: Option<(f64, bool)>) {
+        match seen {
             None => self.outside += 1,
-            Some(area) if area > 0.0 => {
+            Some((area, is_hidden)) if area > 0.0 => {
                 self.shown += 1;
+                self.hidden += u64::from(is_hidden);
                 self.area_px += area;
                 self.sizes_px.add(area);
             }
@@ -103,31 +109,34 @@ struct Screen<'a> {
     field: &'a Field,
     view: &'a View,
     frame: Frame,
+    depths: Depths<'a>,
     clip_from_relative: glam::DMat4,
 }
 
 impl<'a> Screen<'a> {
-    fn new(field: &'a Field, view: &'a View) -> Self {
-        Self { field, view, frame: Frame::placing(field, view), clip_from_relative: view.clip_from_relative() }
+    fn new(field: &'a Field, view: &'a View, depth: &'a [f32]) -> Self {
+        let (frame, clip_from_relative) = (Frame::placing(field, view), view.clip_from_relative());
+        Self { field, view, frame, depths: Depths { size: view.size, values: depth }, clip_from_relative }
     }
 
     fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Economy {
         let mut economy = Economy::new();
         expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle| {
-            economy.add(self.area_px(&triangle.corners));
+            economy.add(self.seen(&triangle.corners));
         });
         economy
     }
 
-    /// The area, pixels, that a triangle has in the picture, negative if it faces away; `None` if it lies outside.
-    fn area_px(&self, triangle: &Triangle) -> Option<f64> {
+    /// The area, pixels, that a triangle has in the picture, negative if it faces away, and whether it is hidden;
+    /// `None` if it lies outside.
+    fn seen(&self, triangle: &Triangle) -> Option<(f64, bool)> {
         let corners = triangle.map(|corner| {
             let point = self.field.world_at(corner.x.into(), corner.z.into(), corner.y.into());
             self.clip_from_relative * (point - self.view.eye).extend(1.0)
         });
         let [w, h] = self.view.size.map(f64::from);
         // Two units of clip space across the picture; its y points down, which turns the sense round.
-        clipped(corners).map(|polygon| -signed_area(&polygon) * w * h / 4.0)
+        clipped(corners).map(|polygon| (-signed_area(&polygon) * w * h / 4.0, self.depths.hide(&polygon)))
     }
 }
 
@@ -220,7 +229,8 @@ mod tests {
     }
 
     fn measure(view: &View, corners: &[([i32; 2], f32)]) -> Economy {
-        economy(&field(), view, &Geometry::default(), &list(corners))
+        let nothing = vec![0.0; (view.size[0] * view.size[1]) as usize];
+        economy(&field(), view, &Geometry::default(), &list(corners), &nothing)
     }
 
     #[test]
@@ -288,6 +298,23 @@ mod tests {
         let found = measure(&view, &corners);
         assert_eq!((found.shown, found.sub_pixel_share), (4, 0.5));
         assert!((found.area_px - 11.0).abs() < 1e-9);
+    }
+
+    /// A roof 10 m above half of the floor: from above it hides what lies under it, and nothing else.
+    #[test]
+    fn what_lies_behind_what_was_drawn_is_hidden() {
+        let half = |x: i32, y: f32| {
+            [([x, 0], y), ([x, SIDE], y), ([x + 32, 0], y), ([x + 32, 0], y), ([x, SIDE], y), ([x + 32, SIDE], y)]
+        };
+        let corners = [half(0, 0.0), half(32, 0.0), half(32, 10.0)].concat();
+        let view = above(32.0, 32.0, 64);
+        let depth_of = |y: f64| (1e3 - (100.0 - y)) / (1e3 - 1.0);
+        let [w, h] = view.size;
+        let drawn = |k: u32| if k % w >= w / 2 { depth_of(10.0) as f32 } else { depth_of(0.0) as f32 };
+        let depth: Vec<f32> = (0..w * h).map(drawn).collect();
+        let found = economy(&field(), &view, &Geometry::default(), &list(&corners), &depth);
+        assert_eq!((found.shown, found.hidden), (6, 2));
+        assert_eq!(measure(&view, &corners).hidden, 0);
     }
 
     #[test]

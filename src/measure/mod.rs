@@ -4,6 +4,7 @@
 
 pub mod economy;
 pub mod geometric;
+pub mod hidden;
 pub mod histogram;
 pub mod image;
 pub mod peers;

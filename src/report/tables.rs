@@ -46,6 +46,9 @@ const TIMES: &[Column] = &[
     ("hitches, %", |r| r.time.as_ref().map(|t| number(t.hitches_percent))),
     ("triangles", |r| r.time.as_ref().map(|t| number(t.triangles))),
     ("near-optimal ×", |r| r.errors.as_ref()?.reference?.multiple.map(number)),
+    ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
+    ("below a pixel, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
+    ("overdraw", |r| r.errors.as_ref()?.economy.as_ref()?.overdraw.map(number)),
     ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),
     ("device bytes", |r| r.time.as_ref().map(|t| number(t.device_bytes as f64))),
 ];

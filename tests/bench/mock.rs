@@ -100,6 +100,7 @@ impl Laboratory for Mock {
         (errors.hole_pixels, errors.skirt_pixels) = (Some(0), Some(0));
         errors.economy = Some(Economy {
             pixels_per_triangle: (-2..=8).map(|k| bin(k, (1000 - 30 * (k - peak - 3).pow(2)).max(3) as u64)).collect(),
+            hidden_share: 0.3,
             subpixel_share: 0.04,
             overdraw: Some(1.2),
         });
