@@ -3,10 +3,12 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use cuesta::bench::paths;
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
 use cuesta::draw::{Draw, DrawList, Instance, Source, Submission, Topology, weights};
 use cuesta::height::bounds::{Bounds, Measure};
+use cuesta::height::synth::{Kind, synth};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::Technique;
 use cuesta::lod::clusters::mesh::Mesh;
@@ -104,6 +106,25 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
     assert!(closest > 0.9, "the bound is no trivial one: {closest} of the tolerance");
     assert!(kinds.len() == 23, "only {} kinds of clusters occurred", kinds.len());
     assert!(clusters * 3 < blocks, "{clusters} clusters for {blocks} blocks");
+}
+
+#[test]
+fn every_frame_of_skim_and_circle_is_drawn_alike_in_every_mode() {
+    let mut field = synth(Kind::Eroded, [513, 513], 7);
+    field.spacing = [25.0; 2];
+    let field = Arc::new(field);
+    for morph in ["morph=off", "morph=on"] {
+        let modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"];
+        let mut modes = modes.map(|mode| technique(&field, mode, &[morph, "block=16"]));
+        for path in ["skim", "circle"].map(|name| paths::find(name).expect("a named path")) {
+            let tolerance = Tolerance { px: 4.0, metric: Metric::Certified };
+            for (frame, view) in path.views(&field, 48, [320, 180], tolerance).iter().enumerate() {
+                let [indirect, cluster, block] = modes.each_mut().map(|mode| drawn(&field, mode.as_mut(), view).0);
+                let what = format!("{morph}, frame {frame} of {}", path.name);
+                assert!(!indirect.is_empty() && indirect == cluster && indirect == block, "{what}");
+            }
+        }
+    }
 }
 
 /// Flat but for a rough spot on each side of the squares of sixteen samples.
