@@ -229,24 +229,29 @@ impl View {
         DVec2::new(f64::from(self.size[0]), f64::from(self.size[1])) / (2.0 * self.focal_px())
     }
 
-    /// The planes around what can be seen, without a far plane.
-    pub fn frustum(&self) -> Frustum {
+    /// The planes around what can be seen, without a far plane: `normal · (p − eye) + distance ≥ 0` inside.
+    pub fn planes(&self) -> [(DVec3, f64); 5] {
         let half = self.half_extent();
         let rotate = self.world_from_eye;
-        let side = |x: f64, y: f64| match self.lens {
-            // Inside: the slope towards (x, y) is at most `half`.
-            Lens::Perspective { .. } => {
-                let normal = rotate * DVec3::new(-x, -y, -(x.abs() * half.x + y.abs() * half.y));
-                (normal, normal.dot(self.eye))
-            }
-            Lens::Orthographic { .. } => {
-                let normal = rotate * DVec3::new(-x, -y, 0.0);
-                (normal, normal.dot(self.eye) - (x.abs() * half.x + y.abs() * half.y))
+        let side = |x: f64, y: f64| {
+            let reach = x.abs() * half.x + y.abs() * half.y;
+            match self.lens {
+                // Inside: the slope towards (x, y) is at most `half`.
+                Lens::Perspective { .. } => (rotate * DVec3::new(-x, -y, -reach), 0.0),
+                Lens::Orthographic { .. } => (rotate * DVec3::new(-x, -y, 0.0), reach),
             }
         };
-        let forward = self.forward();
-        let near = (forward, forward.dot(self.eye) + self.near);
-        Frustum { planes: [near, side(1.0, 0.0), side(-1.0, 0.0), side(0.0, 1.0), side(0.0, -1.0)] }
+        [(self.forward(), -self.near), side(1.0, 0.0), side(-1.0, 0.0), side(0.0, 1.0), side(0.0, -1.0)]
+    }
+
+    /// The planes around what can be seen, in the world.
+    pub fn frustum(&self) -> Frustum {
+        Frustum { planes: self.planes().map(|(normal, distance)| (normal, normal.dot(self.eye) - distance)) }
+    }
+
+    /// Length of the ray through a picture corner at unit depth.
+    pub fn corner_ray(&self) -> f64 {
+        self.half_extent().length().hypot(1.0)
     }
 
     /// The largest vertical displacement, metres, that a surface inside `bounds` may have under the
@@ -261,7 +266,7 @@ impl View {
             view: *self,
             forward: self.forward(),
             focal_px: self.focal_px(),
-            corner: self.half_extent().length().hypot(1.0),
+            corner: self.corner_ray(),
         }
     }
 

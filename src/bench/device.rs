@@ -126,6 +126,7 @@ impl Laboratory for DeviceLaboratory {
             let is_measured = frame % scene.case.every == 0;
             let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
             let times = stage.draw(technique.as_mut(), view, copy)?;
+            stage.complete()?;
             if is_measured {
                 let truth = self.truth(scene, frame)?;
                 let fragments = times.gpu.statistics.map(|[.., fragments]| fragments);

@@ -11,6 +11,7 @@ pub mod glsl {
     pub type int = i32;
     pub type float = f32;
     pub type uvec2 = [u32; 2];
+    pub type uvec3 = [u32; 3];
     pub type uvec4 = [u32; 4];
     pub type ivec2 = [i32; 2];
     pub type vec2 = [f32; 2];
@@ -149,6 +150,109 @@ shared! {
         largest_m: float,
         /// Largest screen error, pixels.
         largest_px: float,
+    }
+
+    /// What a view says about the nodes of clusters (`lod::clusters`), in single precision and relative to the eye.
+    struct ClusterView {
+        /// As in `Frame`.
+        anchor: ivec2,
+        /// As in `Frame`, metres.
+        anchor_relative: vec2,
+        /// As in `Frame`, metres.
+        anchor_height: float,
+        /// As in `Frame`, metres.
+        anchor_height_relative: float,
+        /// Distance of neighbouring samples (x, z), metres.
+        spacing: vec2,
+        /// Planes around what can be seen: normal · p + w ≥ 0 inside.
+        near_plane: vec4,
+        /// See `near_plane`.
+        right_plane: vec4,
+        /// See `near_plane`.
+        left_plane: vec4,
+        /// See `near_plane`.
+        upper_plane: vec4,
+        /// See `near_plane`.
+        lower_plane: vec4,
+        /// Unit vector that the eye looks along.
+        forward: vec3,
+        /// 0: certified, through a pinhole; 1: the paper's, through a pinhole; 2: the same error everywhere.
+        metric: uint,
+        /// Near plane, metres.
+        near: float,
+        /// Length of the ray through a picture corner at unit depth.
+        corner: float,
+        /// Its inverse.
+        inverse_corner: float,
+        /// Pixels per unit of slope (or per metre, metric 2) over the pixels tolerated.
+        scale: float,
+        /// |y| of `forward`.
+        lean: float,
+        /// Where the band ends that begins at 1.
+        band_end: float,
+        /// Weights per ratio in the band; 0: there is no band.
+        band_scale: float,
+        /// Whether nodes outside the planes are left as they are.
+        culls: uint,
+    }
+
+    /// What does not change of the quadtree of clusters. Offsets count words after this struct.
+    struct ClusterTree {
+        /// The last sample of the field.
+        last: ivec2,
+        /// Samples after which the field repeats; 0: it does not.
+        period: uvec2,
+        /// Cells along a side of a block.
+        cells: uint,
+        /// Level of the root.
+        root: uint,
+        /// Whether squares that the end of a tiled field cuts have their whole range as error.
+        cuts: uint,
+        /// The most nodes that may be split.
+        most: uint,
+        /// Places in the table of split nodes: a power of two.
+        places: uint,
+        /// Where the levels are: for each the offset of its squares, how many there are (x, z), and the offset of
+        /// its split nodes in `ClusterScratch`'s words.
+        levels: uint,
+        /// Where seed and turns of each state are.
+        states: uint,
+        /// Where each seed's first index and number of indices are.
+        ranges: uint,
+        /// Seeds.
+        seeds: uint,
+        /// In the scratch: for each level the number of split nodes and two times groups to dispatch.
+        rows: uint,
+        /// In the scratch: places of all split nodes.
+        list: uint,
+        /// In the scratch: what each split node draws.
+        clusters: uint,
+        /// In the scratch: ids of split nodes, by place.
+        keys: uint,
+        /// In the scratch: ratios, as bits.
+        ratios: uint,
+        /// In the scratch: which children are blocks.
+        blocks: uint,
+        /// In the scratch: instances of each seed.
+        counts: uint,
+    }
+
+    /// What the selection of clusters begins its scratch with.
+    struct ClusterScratch {
+        /// Groups of split nodes to dispatch.
+        groups: uvec3,
+        /// Split nodes.
+        splits: uint,
+        /// Whether there were more than fit.
+        overflow: uint,
+    }
+
+    /// What selection on the device says before its commands.
+    struct Tally {
+        /// Commands.
+        draws: uint,
+        /// Whether it gave up: what is drawn is coarse.
+        overflow: uint,
     }
 
     /// What the oracle is given beside the scene.

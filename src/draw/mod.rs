@@ -1,5 +1,6 @@
 //! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
 
+pub mod driver;
 pub mod expand;
 pub mod layout;
 pub mod place;
@@ -7,6 +8,7 @@ pub mod weights;
 
 use std::ops::Range;
 
+pub use driver::Driver;
 pub use layout::{ExplicitVertex, Instance, LatticeVertex};
 
 /// What a draw's indices address.
@@ -70,10 +72,13 @@ pub enum Submission {
     Indirect,
     /// One recorded draw call per draw.
     Direct,
+    /// The device finds draws and instances itself ([`Driver`]) from [`DrawList::parameters`]; those in the list, if
+    /// any, were read back.
+    Driven,
 }
 
 /// What a technique wants drawn in one view.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct DrawList {
     /// The draws, those of one source and topology side by side.
     pub draws: Vec<Draw>,
@@ -85,6 +90,11 @@ pub struct DrawList {
     pub uploads: Vec<Upload>,
     /// How the draws reach the device.
     pub submission: Submission,
+    /// What the device is told of the view where it finds the draws itself.
+    pub parameters: Vec<u32>,
+    /// What the view's tolerance was multiplied by because the list would not have fitted its limits: 1 where
+    /// nothing was, infinite where no tolerance was kept.
+    pub widening: f64,
 }
 
 /// The most that any list of a technique holds: buffers of this size are made once.
@@ -100,6 +110,17 @@ pub struct Limits {
     pub indices: usize,
     /// Bytes of uploads in a list.
     pub upload_bytes: usize,
+}
+
+/// What a technique keeps on the device, and the room that its lists need there.
+#[derive(Clone, Copy, Debug)]
+pub struct Kept<'a> {
+    /// Geometry.
+    pub geometry: &'a Geometry,
+    /// The most of any list.
+    pub limits: Limits,
+    /// How the device finds draws itself, if it can.
+    pub driver: Option<&'a Driver>,
 }
 
 impl Topology {
@@ -139,6 +160,20 @@ impl Draw {
     }
 }
 
+impl Default for DrawList {
+    fn default() -> Self {
+        Self {
+            draws: Vec::new(),
+            instances: Vec::new(),
+            streamed: Geometry::default(),
+            uploads: Vec::new(),
+            submission: Submission::default(),
+            parameters: Vec::new(),
+            widening: 1.0,
+        }
+    }
+}
+
 impl DrawList {
     /// Empties the list and keeps its memory.
     pub fn clear(&mut self) {
@@ -149,6 +184,8 @@ impl DrawList {
         self.streamed.indices.clear();
         self.uploads.clear();
         self.submission = Submission::default();
+        self.parameters.clear();
+        self.widening = 1.0;
     }
 
     /// Triangles the list submits, degenerate ones included.
@@ -157,10 +194,11 @@ impl DrawList {
     }
 
     /// Draw calls that the host records for the list: one for each run of draws of one source and topology, or
-    /// one for each draw.
+    /// one for each draw, or one for all that the device finds.
     pub fn commands(&self) -> usize {
         match self.submission {
             Submission::Direct => self.draws.len(),
+            Submission::Driven => 1,
             Submission::Indirect => {
                 self.draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)).count()
             }

@@ -5,26 +5,47 @@ use super::weights::{FINER, ONE, Slot, get, is_stitched, slot, vertex_level};
 use crate::height::{Field, Samples};
 use crate::view::View;
 
+/// What positions are told from, so that nothing large is rounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchor {
+    /// The lattice position nearest the eye.
+    pub at: [i32; 2],
+    /// Where that lies relative to the eye (x, z), metres.
+    pub relative: [f32; 2],
+    /// A height near the eye's, metres.
+    pub height: f32,
+    /// Where that lies relative to the eye, metres.
+    pub height_relative: f32,
+}
+
+impl Anchor {
+    /// The anchor of an eye over a lattice.
+    pub fn new(origin: [f64; 2], spacing: [f64; 2], eye: glam::DVec3) -> Self {
+        // It may lie far outside the field: i32 is clamped so that differences stay exact.
+        let at = [0, 1].map(|k| {
+            let at = (eye[2 * k] - origin[k]) / spacing[k];
+            at.round().clamp(-(2f64.powi(29)), 2f64.powi(29)) as i32
+        });
+        let relative = [0, 1].map(|k| (origin[k] + f64::from(at[k]) * spacing[k] - eye[2 * k]) as f32);
+        let height = eye.y as f32;
+        Self { at, relative, height, height_relative: (f64::from(height) - eye.y) as f32 }
+    }
+}
+
 impl Frame {
     /// The part of a frame that says where vertices lie.
     pub fn placing(field: &Field, view: &View) -> Frame {
-        // The anchor may lie far outside the field: i32 is clamped so that differences stay exact.
-        let anchor = [0, 1].map(|k| {
-            let at = (view.eye[2 * k] - field.origin[k]) / field.spacing[k];
-            at.round().clamp(-(2f64.powi(29)), 2f64.powi(29)) as i32
-        });
-        let relative = |k: usize| field.origin[k] + f64::from(anchor[k]) * field.spacing[k] - view.eye[2 * k];
-        let anchor_height = view.eye.y as f32;
+        let anchor = Anchor::new(field.origin, field.spacing, view.eye);
         let (height_zero, height_scale) = match *field.samples() {
             Samples::F32(_) => (0.0, 1.0),
             Samples::Coded { zero, scale, .. } => (zero, scale),
         };
         Frame {
             clip_from_relative: view.clip_from_relative().as_mat4().to_cols_array_2d(),
-            anchor,
-            anchor_relative: [relative(0) as f32, relative(1) as f32],
-            anchor_height,
-            anchor_height_relative: (f64::from(anchor_height) - view.eye.y) as f32,
+            anchor: anchor.at,
+            anchor_relative: anchor.relative,
+            anchor_height: anchor.height,
+            anchor_height_relative: anchor.height_relative,
             spacing: field.spacing.map(|s| s as f32),
             last: field.size().map(|n| n as i32 - 1),
             stored: field.stored().map(|n| n as i32),

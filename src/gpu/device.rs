@@ -62,6 +62,8 @@ pub struct Gpu {
     pub has_statistics: bool,
     /// Whether vertex programs may write to buffers: what capturing the as-drawn mesh needs.
     pub captures: bool,
+    /// Whether the number of draws may come from a buffer (`drawIndirectCount`): what selection on the device needs.
+    pub counts_draws: bool,
     /// Allocator of all memory.
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     utils: Option<ext::debug_utils::Device>,
@@ -143,6 +145,14 @@ fn missing_features(instance: &Instance, raw: vk::PhysicalDevice) -> Vec<String>
     .collect()
 }
 
+fn counts_draws(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12);
+    // SAFETY: the chain holds structs that a 1.3 device knows.
+    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
+    v12.draw_indirect_count == vk::TRUE
+}
+
 impl Candidate {
     /// Whether it computes on the CPU.
     pub fn is_software(&self) -> bool {
@@ -186,7 +196,11 @@ impl Gpu {
             .fill_mode_non_solid(true)
             .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE)
             .vertex_pipeline_stores_and_atomics(available.vertex_pipeline_stores_and_atomics == vk::TRUE);
-        let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
+        let counts_draws = counts_draws(instance, candidate.raw);
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
+            .scalar_block_layout(true)
+            .host_query_reset(true)
+            .draw_indirect_count(counts_draws);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
             .synchronization2(true)
@@ -230,6 +244,7 @@ impl Gpu {
             limits,
             timestamp_ns: if timestamp_bits > 0 { f64::from(limits.timestamp_period) } else { 0.0 },
             has_statistics: available.pipeline_statistics_query == vk::TRUE,
+            counts_draws,
             captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             utils,

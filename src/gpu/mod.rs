@@ -8,6 +8,7 @@ mod bindings;
 pub mod capture;
 pub mod clock;
 pub mod device;
+pub mod driven;
 pub mod floor;
 pub mod frames;
 #[cfg(feature = "viewer")]

@@ -3,18 +3,19 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
+use super::driven::Driven;
 use super::frames::{Recording, SLOTS, once};
 use super::memory::{Buffer, Image, memory_barrier};
 use super::pages::{self, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
 use crate::draw::layout::{ExplicitVertex, Frame, Instance};
-use crate::draw::{Draw, DrawList, Geometry, Limits, Source, Submission, Upload};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
@@ -28,6 +29,7 @@ pub struct Terrain {
     descriptors: vk::DescriptorPool,
     samplers: [vk::Sampler; 3],
     images: [Image; 3],
+    driven: Option<Driven>,
 }
 
 /// Geometry that stays.
@@ -48,17 +50,17 @@ struct Slot {
     staging: Buffer,
 }
 
-const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
+/// Bytes of an indexed indirect command.
+pub(super) const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
 
 impl Terrain {
-    /// Makes the resources of a scene for a technique whose lists keep `limits`.
+    /// Makes the resources of a scene for a technique that keeps these on the device.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
         field: &Field,
         overlay: Option<&image::RgbaImage>,
-        resident: &Geometry,
-        limits: Limits,
+        kept: Kept,
         formats: Formats,
     ) -> Result<Self> {
         let pipelines = Pipelines::new(gpu, plan, formats)?;
@@ -77,16 +79,17 @@ impl Terrain {
             pages::sampler(gpu, Sampling::Clamped)?,
         ];
         let descriptors = descriptor_pool(gpu)?;
-        let resident = Resident::new(gpu, resident)?;
+        let resident = Resident::new(gpu, kept.geometry)?;
         let mut terrain = Self {
             gpu: Arc::clone(gpu),
             pipelines,
-            limits,
+            limits: kept.limits,
             resident,
             slots: Vec::new(),
             descriptors,
             samplers,
             images,
+            driven: driven(gpu, kept.driver)?,
         };
         terrain.make_slots()?;
         Ok(terrain)
@@ -114,17 +117,24 @@ impl Terrain {
     }
 
     /// Gives the scene another technique: what comes from the field alone stays.
-    pub fn retarget(&mut self, resident: &Geometry, limits: Limits) -> Result<()> {
+    pub fn retarget(&mut self, kept: Kept) -> Result<()> {
         self.gpu.wait_idle()?;
         self.slots.clear();
         // SAFETY: the device is idle and the slots that used the sets are gone.
         unsafe { self.gpu.raw.reset_descriptor_pool(self.descriptors, vk::DescriptorPoolResetFlags::empty())? };
-        self.resident = Resident::new(&self.gpu, resident)?;
-        self.limits = limits;
+        self.driven = None;
+        self.resident = Resident::new(&self.gpu, kept.geometry)?;
+        self.limits = kept.limits;
+        self.driven = driven(&self.gpu, kept.driver)?;
         self.make_slots()
     }
 
-    /// Writes a frame's data and records its uploads: before the target begins.
+    /// The selection on the device, if the technique has a driver and the device can run it.
+    pub fn driven(&self) -> Option<&Driven> {
+        self.driven.as_ref()
+    }
+
+    /// Writes a frame's data and records its uploads, or its selection: before the target begins.
     ///
     /// # Panics
     /// If the list exceeds the limits that its technique stated.
@@ -132,6 +142,9 @@ impl Terrain {
         assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
         let slot = &mut self.slots[recording.slot];
         slot.frame.write(0, bytemuck::bytes_of(frame));
+        if list.submission == Submission::Driven {
+            return self.driven.as_mut().context("no selection on this device")?.select(recording, &list.parameters);
+        }
         slot.instances.write(0, cast_slice(&list.instances));
         slot.vertices.write(0, cast_slice(&list.streamed.vertices));
         slot.indices.write(0, cast_slice(&list.streamed.indices));
@@ -187,18 +200,29 @@ impl Terrain {
     /// Calls `record` for each run of draws of one pipeline, with that and its geometry bound.
     pub(super) fn each_run(&self, r: &Recording, list: &DrawList, mut record: impl FnMut(&Recording, Range<usize>)) {
         self.bind_scene(r);
+        if list.submission == Submission::Driven {
+            self.bind_pipeline(r, Source::Lattice, Topology::Triangles);
+            self.bind_geometry(r, Source::Lattice);
+            if let Some(driven) = &self.driven {
+                // SAFETY: the buffer lives until the frame has ended.
+                unsafe { self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 1, &[driven.instances(r)], &[0]) };
+            }
+            return record(r, 0..list.draws.len());
+        }
         let mut first = 0;
         let kind = |d: &Draw| (d.source, d.topology);
         for run in list.draws.chunk_by(|a, b| kind(a) == kind(b)) {
             self.bind_geometry(r, run[0].source);
-            // SAFETY: the pipeline outlives the frame.
-            unsafe {
-                let pipeline = self.pipelines.terrain(run[0].source, run[0].topology);
-                self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
-            }
+            self.bind_pipeline(r, run[0].source, run[0].topology);
             record(r, first..first + run.len());
             first += run.len();
         }
+    }
+
+    fn bind_pipeline(&self, r: &Recording, source: Source, topology: Topology) {
+        let pipeline = self.pipelines.terrain(source, topology);
+        // SAFETY: the pipeline outlives the frame.
+        unsafe { self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline) };
     }
 
     pub(super) fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
@@ -236,6 +260,11 @@ impl Terrain {
                     unsafe { raw.cmd_draw_indexed_indirect(r.commands, commands, offset, count, COMMAND as u32) };
                 }
             }
+            Submission::Driven => match &self.driven {
+                Some(driven) if draws == (0..list.draws.len()) => driven.draw(r),
+                Some(driven) => driven.draw_some(r, draws),
+                None => {}
+            },
             Submission::Direct => {
                 for draw in &list.draws[draws] {
                     let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
@@ -274,6 +303,10 @@ impl Terrain {
     }
 }
 
+fn driven(gpu: &Arc<Gpu>, driver: Option<&Driver>) -> Result<Option<Driven>> {
+    driver.filter(|_| gpu.counts_draws).map(|driver| Driven::new(gpu, driver)).transpose()
+}
+
 fn command_bytes(draw: &Draw) -> [u8; COMMAND] {
     let words = [
         draw.indices.len() as u32,
@@ -298,7 +331,7 @@ impl Resident {
 }
 
 /// A device-local buffer with this content.
-fn filled(gpu: &Arc<Gpu>, purpose: &'static str, data: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer> {
+pub(super) fn filled(gpu: &Arc<Gpu>, purpose: &'static str, data: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer> {
     let buffer = Buffer::device(gpu, purpose, data.len() as u64, usage)?;
     if data.is_empty() {
         return Ok(buffer);
@@ -310,7 +343,7 @@ fn filled(gpu: &Arc<Gpu>, purpose: &'static str, data: &[u8], usage: vk::BufferU
         // SAFETY: both buffers outlive the wait in `once`.
         unsafe { gpu.raw.cmd_copy_buffer(r.commands, staging.raw, buffer.raw, &region) };
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let read = (Stage::VERTEX_INPUT, Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ);
+        let read = (Stage::ALL_COMMANDS, Access::MEMORY_READ);
         memory_barrier(gpu, r.commands, (Stage::COPY, Access::TRANSFER_WRITE), read);
         Ok(())
     })?;

@@ -139,6 +139,23 @@ impl Bounds {
         self.levels.len() as u32
     }
 
+    /// The squares held of a level: how many (x, z), and all row by row. Those of a tiled axis begin at every
+    /// multiple of the side within the period.
+    pub fn held(&self, level: u32) -> ([u32; 2], &[Square]) {
+        let level = &self.levels[level as usize];
+        (level.count, &level.squares)
+    }
+
+    /// After how many samples (x, z) the field repeats, if it does.
+    pub fn period(&self) -> [Option<u32>; 2] {
+        self.period
+    }
+
+    /// Whether errors were measured.
+    pub fn has_errors(&self) -> bool {
+        self.measure.errors
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(level.squares.as_slice())).sum()

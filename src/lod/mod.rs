@@ -9,7 +9,7 @@ pub mod settings;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Geometry, Limits};
+use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Submission};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -24,6 +24,31 @@ pub trait Technique: Send {
 
     /// Fills the (empty) list with what this view needs.
     fn select(&mut self, view: &View, list: &mut DrawList);
+
+    /// How the device finds the draws itself, if it can: the same draws and instances as [`Self::select`], in any
+    /// order.
+    fn driver(&self) -> Option<&Driver> {
+        None
+    }
+
+    /// What the device is told of a view ([`DrawList::parameters`]), where there is a driver. Its time does not
+    /// depend on what is drawn.
+    fn parameters(&self, _view: &View, _words: &mut Vec<u32>) {}
+
+    /// Fills the (empty) list with what the device is told of a view.
+    ///
+    /// # Panics
+    /// If the technique has no driver.
+    fn drive(&mut self, view: &View, list: &mut DrawList) {
+        assert!(self.driver().is_some(), "a technique with a driver");
+        list.submission = Submission::Driven;
+        self.parameters(view, &mut list.parameters);
+    }
+
+    /// What stays on the device.
+    fn kept(&self) -> Kept<'_> {
+        Kept { geometry: self.resident(), limits: self.limits(), driver: self.driver() }
+    }
 
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;

@@ -87,6 +87,7 @@ pub fn run(
             probed.push(frame);
         }
     }
+    stages[0].complete()?;
     let (profile, trace) = summary(&stages[0].list, probed, &modes, &forms)?;
     Ok(Measured { profile, trace, forms, stages, modes, view: *view })
 }
@@ -100,7 +101,8 @@ fn stage(scene: &Scene, form: &Form, view: &View) -> Result<Stage> {
 fn both_ways(k: usize, form: &mut Form, stage: &mut Stage, view: &View) -> Result<[Mode; 2]> {
     stage.draw(form.technique.as_mut(), view, Copy::Nothing)?;
     let own = stage.list.submission;
-    let other = if own == Submission::Direct { Submission::Indirect } else { Submission::Direct };
+    // The host selects for the other one.
+    let other = if own == Submission::Indirect { Submission::Direct } else { Submission::Indirect };
     let mode = |submission| Mode { form: k, submission, commands: 0, draws: 0, triangles: 0, times: Vec::new() };
     Ok([own, other].map(mode))
 }
@@ -180,6 +182,14 @@ fn draw_row(list: &DrawList, probed: &[ProbedFrame], k: usize) -> DrawRow {
     }
 }
 
+fn submission_name(submission: Submission) -> &'static str {
+    match submission {
+        Submission::Direct => "direct",
+        Submission::Indirect => "indirect",
+        Submission::Driven => "driven",
+    }
+}
+
 fn mode_row(mode: &Mode, base: &Mode, form: &str) -> ModeRow {
     let us = |of: fn(&Times) -> f64| Estimate::of(mode.times.iter().map(|t| 1e3 * of(t))).rounded();
     let ratio = |of: fn(&Times) -> f64| {
@@ -191,7 +201,7 @@ fn mode_row(mode: &Mode, base: &Mode, form: &str) -> ModeRow {
     let a_draw = |us: f64| rounded(us / mode.draws.max(1) as f64);
     ModeRow {
         form: form.to_string(),
-        submission: if mode.submission == Submission::Direct { "direct" } else { "indirect" }.to_string(),
+        submission: submission_name(mode.submission).to_string(),
         commands: mode.commands,
         draws: mode.draws,
         triangles: mode.triangles,

@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::Stage;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Captured;
-use crate::draw::{DrawList, Geometry};
+use crate::draw::{DrawList, Geometry, Submission};
 use crate::gpu::capture::{Capture, Part};
 use crate::gpu::oracle::{self, Oracle, Summary};
 use crate::height::surface::{Corner, Triangle, doubled_area};
@@ -87,7 +87,10 @@ impl Stage {
         if self.capture.is_none() {
             self.capture = Some(Capture::new(&self.gpu, &self.plan, self.terrain.set_layout())?);
         }
+        self.complete()?;
         let mut list = std::mem::take(&mut self.list);
+        // Instances that the device found are in the list now.
+        let submission = std::mem::replace(&mut list.submission, Submission::Direct);
         // They were made when the list was drawn.
         list.uploads.clear();
         let frame = self.look.frame(&self.field, view, self.range);
@@ -103,7 +106,7 @@ impl Stage {
             let records = self.capture.as_ref().expect("made above").records().to_vec();
             visit(self, batch, &list, &records)
         });
-        self.list = list;
+        self.list = DrawList { submission, ..list };
         visited
     }
 }

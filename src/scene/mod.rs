@@ -94,12 +94,12 @@ pub enum Copy {
 impl<'a> Scene<'a> {
     /// Makes it ready for a technique.
     pub fn stage(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
-        let (resident, limits) = (technique.resident(), technique.limits());
+        let kept = technique.kept();
         let formats = Offscreen::FORMATS;
         let statistics = self.field.statistics();
         Ok(Stage {
             frames: Frames::new(self.gpu, self.plan.measured)?,
-            terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, resident, limits, formats)?,
+            terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, kept, formats)?,
             floor: None,
             capture: None,
             probe: None,
@@ -119,6 +119,7 @@ impl<'a> Scene<'a> {
         let mut stage = self.stage(technique, view.size)?;
         let drawn = (0..times.max(1)).map(|_| stage.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().values().sum();
+        stage.complete()?;
         Ok(Shot { picture: stage.picture(), list: stage.list, times: Times::median(drawn), device_bytes })
     }
 }
@@ -147,13 +148,38 @@ impl Stage {
         let record_ms = ms(recorded);
         self.frames.submit(None, None)?;
         self.frames.finish().context("drawing")?;
+        self.read_draws();
         Ok(Times { frame_ms: ms(started), select_ms, upload_ms, record_ms, gpu: self.frames.timing.clone() })
     }
 
+    /// Selects on the device if that can and nothing else is asked for.
     fn select(&mut self, technique: &mut dyn Technique, view: &View) {
         self.list.clear();
-        technique.select(view, &mut self.list);
-        self.list.submission = self.submission.unwrap_or(self.list.submission);
+        let own = self.submission.unwrap_or(Submission::Driven);
+        if own == Submission::Driven && self.terrain.driven().is_some() {
+            technique.drive(view, &mut self.list);
+        } else {
+            technique.select(view, &mut self.list);
+            self.list.submission = self.submission.unwrap_or(self.list.submission);
+        }
+    }
+
+    /// The draws that the device found itself, once the frame has finished.
+    fn read_draws(&mut self) {
+        if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {
+            driven.read_draws(driven.newest(), &mut self.list);
+        }
+    }
+
+    /// Makes the list whole: instances that the device found itself are read back.
+    pub fn complete(&mut self) -> Result<()> {
+        if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {
+            let count = self.list.draws.iter().map(|draw| draw.instances.end).max().unwrap_or(0);
+            if self.list.instances.len() < count as usize {
+                self.list.instances = driven.read_instances(count as usize)?;
+            }
+        }
+        Ok(())
     }
 
     /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed

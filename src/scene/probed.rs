@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::Stage;
-use crate::draw::{Draw, DrawList};
+use super::{Copy, Stage};
+use crate::draw::{Draw, DrawList, Submission};
 use crate::gpu::clock::Clock;
 use crate::gpu::probe::{self, Counts, Measured, Piece, Probe};
 use crate::gpu::target;
@@ -101,14 +101,20 @@ impl Steps {
 
 impl Stage {
     /// Selects and draws a view with queries around every draw, up to [`probe::DRAWS`] of them, and waits until the
-    /// device has finished. `name` is the technique's.
+    /// device has finished. `name` is the technique's. Where the device finds the draws itself, a frame before tells
+    /// which there are.
     pub fn draw_probed(&mut self, technique: &mut dyn Technique, name: &str, view: &View) -> Result<ProbedFrame> {
         if self.probe.is_none() {
             self.probe = Some(Probe::new(&self.gpu)?);
         }
+        self.find_draws(technique, view)?;
         let probe = self.probe.take().expect("just made");
+        let found = std::mem::take(&mut self.list);
         let mut steps = Steps { origin: Instant::now(), done: Vec::new() };
         steps.time("select", || self.select(technique, view));
+        if self.list.submission == Submission::Driven {
+            (self.list.draws, self.list.instances) = (found.draws, found.instances);
+        }
         let cut = probe::pieces(&self.list.draws, probe::DRAWS);
         let pieces: Vec<_> =
             cut.into_iter().map(|draws| Piece { label: label(name, &self.list, draws.clone()), draws }).collect();
@@ -123,6 +129,14 @@ impl Stage {
             Clock::aligned(&self.gpu, steps.origin, [first, last], [submitted, finished])
         });
         Ok(self.probed_frame(&steps, pieces, &measured, &clock))
+    }
+
+    fn find_draws(&mut self, technique: &mut dyn Technique, view: &View) -> Result<()> {
+        if self.terrain.driven().is_some() {
+            self.draw(technique, view, Copy::Nothing)?;
+            self.complete()?;
+        }
+        Ok(())
     }
 
     fn submit_probed(&mut self, steps: &mut Steps, view: &View, probe: &Probe, pieces: &[Piece]) -> Result<()> {

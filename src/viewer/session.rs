@@ -184,13 +184,18 @@ impl Session {
             row("triangles", grouped(figures.triangles)),
             row("draws", grouped(figures.draws as u64)),
             row("technique", format!("{}{frozen}", self.technique_name())),
-            row("tolerance", format!("{:.2} px {metric}", self.tolerance.px)),
+            row("tolerance", format!("{:.2} px {metric}{}", self.tolerance.px, widened(figures.widening))),
             row("colours", format!("{}{wire}", colour_name(self.look.colour))),
             row("camera", format!("{}, {}", self.camera.mode_name(), speed_text(self.camera.speed(&setup.field)))),
             row("position", format!("{x:.0} {y:.0} {z:.0} m")),
             row("above ground", format!("{:.1} m", self.camera.above_ground(&setup.field))),
         ]
     }
+}
+
+/// What is said of a tolerance that was not kept.
+fn widened(factor: f64) -> String {
+    if factor > 1.0 { format!(", times {factor:.2}: too much to draw") } else { String::new() }
 }
 
 /// Where the next screenshot goes: the first free number in the current folder.

@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use super::Setup;
 use super::hud::Painted;
-use crate::draw::DrawList;
+use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::Frames;
 use crate::gpu::hud::Hud;
 use crate::gpu::swapchain::{Surface, Swapchain, Window};
@@ -44,6 +44,8 @@ pub struct Figures {
     pub triangles: u64,
     /// Draws.
     pub draws: usize,
+    /// What the tolerance was multiplied by: 1 where it was kept.
+    pub widening: f64,
 }
 
 /// What a frame shows.
@@ -80,10 +82,9 @@ impl Stage {
         let (entry, settings) = &setup.technique;
         let technique = (entry.build)(Arc::clone(&setup.field), settings);
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
-        let (resident, limits) = (technique.resident(), technique.limits());
         let statistics = setup.field.statistics();
         Ok(Self {
-            terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), resident, limits, formats)?,
+            terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), technique.kept(), formats)?,
             hud: Hud::new(&gpu, formats)?,
             frames: Frames::new(&gpu, plan.measured)?,
             swapchain,
@@ -110,7 +111,7 @@ impl Stage {
     pub fn set_technique(&mut self, setup: &Setup, look: &Look, entry: &Entry, settings: &Settings) -> Result<()> {
         self.technique = (entry.build)(Arc::clone(&setup.field), settings);
         self.list.clear();
-        self.terrain.retarget(self.technique.resident(), self.technique.limits())?;
+        self.terrain.retarget(self.technique.kept())?;
         self.set_look(setup, look)
     }
 
@@ -129,6 +130,7 @@ impl Stage {
     ) -> Result<Option<Shown>> {
         let copy = if shot.wants_copy { self.swapchain.screenshot().ok() } else { None };
         let mut recording = self.frames.begin()?;
+        let slot = recording.slot;
         let Some(image) = self.swapchain.acquire(recording.slot)? else { return Ok(None) };
         let started = Instant::now();
         if shot.frozen {
@@ -136,10 +138,18 @@ impl Stage {
             self.list.uploads.clear();
         } else {
             self.list.clear();
-            self.technique.select(shot.view, &mut self.list);
+            let is_driven = self.terrain.driven().is_some();
+            let select = if is_driven { <dyn Technique>::drive } else { <dyn Technique>::select };
+            select(self.technique.as_mut(), shot.view, &mut self.list);
         }
         self.figures.select_ms = ms(started);
-        (self.figures.triangles, self.figures.draws) = (self.list.triangles(), self.list.draws.len());
+        // Draws that the device finds are those of a frame before, which has finished.
+        if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {
+            driven.read_draws(slot, &mut self.list);
+        }
+        let list = &self.list;
+        (self.figures.triangles, self.figures.draws) = (list.triangles(), list.draws.len());
+        self.figures.widening = list.widening;
         let mut overlay = overlay(&self.figures);
         self.hud.update(std::mem::take(&mut overlay.textures))?;
         let started = Instant::now();

@@ -3,6 +3,7 @@
 
 mod bench;
 mod capture;
+mod driven;
 mod golden;
 mod layout;
 mod neck;

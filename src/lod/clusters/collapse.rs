@@ -1,11 +1,11 @@
-//! From the leaves of the quadtree to clusters, in one pass from the top.
+//! From the split nodes of the quadtree to clusters, in one pass.
 
-use super::refine::{Refinement, Sight};
+use super::refine::{Found, Refinement, Split};
+use super::sight::Sight;
 use super::states::{Seeds, State};
 use super::tree::{Node, SIDES};
 use crate::draw::Instance;
 use crate::draw::weights::{self, FINER, ONE, STITCHED};
-use crate::view::{Containment, Frustum};
 
 /// What a quadrant of a cluster holds.
 const NOTHING: u8 = 0;
@@ -18,9 +18,7 @@ const SEAMS: [(u32, [u32; 2], usize); 4] = [(0, [0, 1], 2), (1, [2, 3], 2), (2, 
 /// The pass over a refined quadtree.
 pub struct Collapse<'a> {
     /// What the refinement was made from.
-    pub sight: Sight<'a>,
-    /// Nodes outside it are not drawn.
-    pub frustum: &'a Frustum,
+    pub sight: &'a Sight<'a>,
     /// The split nodes.
     pub refinement: &'a Refinement,
     /// The clusters.
@@ -34,61 +32,36 @@ pub struct Collapse<'a> {
 impl Collapse<'_> {
     /// Appends the clusters in sight: seed and instance.
     pub fn run(&self, drawn: &mut Vec<(u32, Instance)>) {
-        let root = self.sight.tree.root();
-        match self.visit(root, false, drawn) {
-            FOUR_BLOCKS => self.push_cluster(root, [BLOCK; 4], drawn),
+        if self.refinement.root == Found::Block {
             // A lone block is a quadrant of a parent that is not there.
-            BLOCK if !self.single => drawn.push((0, self.block(root))),
-            _ => {}
+            drawn.push((0, self.block(self.sight.tree.root())));
         }
-    }
-
-    /// What a node leaves for its parent to draw; the rest is appended.
-    fn visit(&self, node: Node, inside: bool, drawn: &mut Vec<(u32, Instance)>) -> u8 {
-        let tree = self.sight.tree;
-        let Some(known) = Some(node).filter(|n| tree.contains(*n)).and_then(|n| tree.known(n)) else { return NOTHING };
-        let inside = inside
-            || match self.frustum.contains(&known.bounds) {
-                Containment::Outside => return NOTHING,
-                Containment::Crossing => false,
-                Containment::Inside => true,
-            };
-        if node.level == 0 || self.refinement.weight(tree, node).is_none() {
-            if !inside && !self.any_in_sight(node) {
-                return NOTHING;
-            }
+        for split in &self.refinement.splits {
             if self.single {
-                drawn.push((0, self.block(node)));
+                let blocks = (0..4).filter(|quadrant| split.blocks >> quadrant & 1 == 1);
+                drawn.extend(blocks.map(|quadrant| (0, self.block(split.node.child(quadrant)))));
+            } else {
+                self.push_cluster(split, drawn);
             }
-            return BLOCK;
         }
-        let state = [0, 1, 2, 3].map(|quadrant| self.visit(node.child(quadrant), inside, drawn));
-        if state == [BLOCK; 4] {
-            return FOUR_BLOCKS;
-        }
-        if state != [NOTHING; 4] {
-            self.push_cluster(node, state, drawn);
-        }
-        NOTHING
     }
 
-    /// Whether any of the finest blocks in a node that crosses the frustum's border may be seen: with the box of the
-    /// whole alone a coarse block might be drawn where finer ones are not, and a wider tolerance would draw more.
-    fn any_in_sight(&self, node: Node) -> bool {
-        let tree = self.sight.tree;
-        node.level == 0
-            || (0..4).map(|quadrant| node.child(quadrant)).filter(|child| tree.contains(*child)).any(|child| {
-                let containment = tree.known(child).map(|known| self.frustum.contains(&known.bounds));
-                match containment {
-                    None | Some(Containment::Outside) => false,
-                    Some(Containment::Inside) => true,
-                    Some(Containment::Crossing) => self.any_in_sight(child),
-                }
-            })
+    /// What the quadrants of a split node hold that it draws itself: four blocks it leaves to its parent.
+    fn state(&self, split: &Split) -> State {
+        const ALL: u32 = 0b1111;
+        if split.blocks == ALL && split.node != self.sight.tree.root() {
+            return [NOTHING; 4];
+        }
+        [0, 1, 2, 3].map(|quadrant| match split.children[quadrant] {
+            _ if split.blocks >> quadrant & 1 == 1 => BLOCK,
+            Some(child) if self.refinement.splits[child as usize].blocks == ALL => FOUR_BLOCKS,
+            _ => NOTHING,
+        })
     }
 
-    fn push_cluster(&self, node: Node, state: State, drawn: &mut Vec<(u32, Instance)>) {
-        if self.single {
+    fn push_cluster(&self, split: &Split, drawn: &mut Vec<(u32, Instance)>) {
+        let (node, state) = (split.node, self.state(split));
+        if state == [NOTHING; 4] {
             return;
         }
         let (seed, turns) = self.seeds.of(state);
@@ -101,12 +74,12 @@ impl Collapse<'_> {
     /// A block by itself: the first quadrant of a cluster, as if the cluster ended with it.
     fn block(&self, node: Node) -> Instance {
         let parent = node.parent();
-        let weight = |node| self.refinement.weight(self.sight.tree, node).unwrap_or(0);
+        let weight = |node| self.refinement.weight(self.sight, node).unwrap_or(0);
         let inside = if node == self.sight.tree.root() { 0 } else { weight(parent) };
         let side = |side: usize| {
             let sibling = node.beyond(side).is_some_and(|beyond| beyond.parent() == parent);
             let root = node == self.sight.tree.root();
-            if sibling || root { inside } else { self.refinement.side_weight(&self.sight, parent, side) }
+            if sibling || root { inside } else { self.refinement.side_weight(self.sight, parent, side) }
         };
         let weights = weights::uniform(inside, SIDES.map(side));
         Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
@@ -122,14 +95,14 @@ impl Collapse<'_> {
     /// node, that of four is their quadrant.
     fn weights(&self, node: Node, state: State) -> [u32; 4] {
         let mut weights = [0; 4];
-        let weight = |node| self.refinement.weight(self.sight.tree, node).unwrap_or(0);
+        let weight = |node| self.refinement.weight(self.sight, node).unwrap_or(0);
         for quadrant in (0..4).filter(|&quadrant| state[quadrant as usize] != NOTHING) {
             let fine = state[quadrant as usize] == FOUR_BLOCKS;
             let parent = if fine { node.child(quadrant) } else { node };
             let finer = if fine { FINER } else { 0 };
             weights::set(&mut weights, weights::inside(quadrant as usize), weight(parent) | finer);
             for (slot, side) in outer_sides(quadrant) {
-                weights::set(&mut weights, slot, self.refinement.side_weight(&self.sight, parent, side));
+                weights::set(&mut weights, slot, self.refinement.side_weight(self.sight, parent, side));
             }
         }
         for (byte, [first, second], side) in SEAMS {
@@ -142,9 +115,9 @@ impl Collapse<'_> {
     fn seam_weight(&self, node: Node, state: State, quadrants: [u32; 2], side: usize) -> u32 {
         let fine = |k: usize| state[quadrants[k] as usize] == FOUR_BLOCKS;
         let weight = match (fine(0), fine(1)) {
-            (true, _) => self.refinement.side_weight(&self.sight, node.child(quadrants[0]), side),
-            (_, true) => self.refinement.side_weight(&self.sight, node.child(quadrants[1]), side ^ 2),
-            _ => self.refinement.weight(self.sight.tree, node).unwrap_or(0),
+            (true, _) => self.refinement.side_weight(self.sight, node.child(quadrants[0]), side),
+            (_, true) => self.refinement.side_weight(self.sight, node.child(quadrants[1]), side ^ 2),
+            _ => self.refinement.weight(self.sight, node).unwrap_or(0),
         };
         if weight < ONE { weight } else { STITCHED }
     }

@@ -20,8 +20,10 @@
 //! Laws kept: watertight, covered once, error within tolerance (`error=measured`), no state between views.
 
 mod collapse;
+mod driver;
 pub mod mesh;
 mod refine;
+mod sight;
 pub mod states;
 mod tree;
 
@@ -29,18 +31,19 @@ use std::sync::Arc;
 
 use self::collapse::Collapse;
 use self::mesh::Mesh;
-use self::refine::{Refinement, Sight};
+use self::refine::Refinement;
+use self::sight::Sight;
 use self::states::Seeds;
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Source, Submission, Topology};
 use crate::height::Field;
 use crate::height::bounds::Measure;
 use crate::view::View;
 
 /// Blocks that morph begin to leave their level where the allowed error reaches their parent's, and have left it at
 /// this many times that: a longer way draws the finer level for longer, a shorter one is seen.
-const MORPH_RATIO: f64 = 1.3;
+const MORPH_RATIO: f32 = 1.3;
 
 /// The most blocks drawn, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
 const MOST_BLOCKS: usize = 1 << 17;
@@ -53,6 +56,7 @@ pub const ENTRY: Entry = Entry {
     variants: &[
         Variant { name: "draw-per-block", about: "a recorded draw a block: the paper's baseline, CLOD" },
         Variant { name: "draw-per-cluster", about: "a recorded draw a cluster, as published" },
+        Variant { name: "gpu-driven", about: "the device selects: no work a node on the host" },
     ],
     settings: &[
         Setting {
@@ -83,10 +87,13 @@ enum Mode {
     DrawPerBlock,
     DrawPerCluster,
     Indirect,
+    GpuDriven,
 }
 
 struct Clusters {
-    most_blocks: usize,
+    /// The most clusters, or blocks, that a list holds.
+    most_drawn: usize,
+    driver: Option<Driver>,
     tree: Tree,
     seeds: Seeds,
     mesh: Mesh,
@@ -94,6 +101,7 @@ struct Clusters {
     mode: Mode,
     cells: u32,
     morph: bool,
+    band_end: f32,
     measured: bool,
     /// Seed and instance of what is drawn.
     drawn: Vec<(u32, Instance)>,
@@ -107,36 +115,47 @@ impl Clusters {
         let mode = match settings.variant() {
             Some("draw-per-block") => Mode::DrawPerBlock,
             Some("draw-per-cluster") => Mode::DrawPerCluster,
+            Some("gpu-driven") => Mode::GpuDriven,
             _ => Mode::Indirect,
         };
-        let band = if morph { MORPH_RATIO } else { 1.0 };
-        let tree = Tree::new(field, Measure { cells, growth: band as f32, errors: measured, morph }, !measured);
+        let band_end = if morph { MORPH_RATIO } else { 1.0 };
+        // A little more than the band is wide: no rounding puts two nodes over a place into theirs.
+        let growth = if morph { band_end * 1.001 } else { 1.0 };
+        let tree = Tree::new(field, Measure { cells, growth, errors: measured, morph }, !measured);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
         let mesh = Mesh::new(cells as i32, &seeds.states);
         // A quadtree has at most three leaves more for each split node.
         let most_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MOST_BLOCKS / 3);
-        let most_blocks = tree.nodes(0).min(3 * most_splits + 1);
-        let refinement = Refinement::new(band, most_splits);
-        Self { most_blocks, tree, seeds, mesh, refinement, mode, cells, morph, measured, drawn: Vec::new() }
+        let most_drawn = match mode {
+            Mode::DrawPerBlock => tree.nodes(0).min(3 * most_splits + 1),
+            // A split node draws at most one, and a lone root is one too.
+            _ => most_splits.max(1),
+        };
+        let driver = (mode == Mode::GpuDriven).then(|| driver::driver(&tree, cells, &seeds, &mesh, most_splits)).flatten();
+        let refinement = Refinement::new(most_splits);
+        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, band_end, measured, drawn: Vec::new() }
     }
 
-    /// Refines the quadtree, with a wider tolerance if there would be too many blocks.
-    fn collapse(&mut self, view: &View) {
-        let frustum = view.frustum();
+    fn sight(&self, view: &View) -> Sight<'_> {
+        Sight::new(&self.tree, view, self.band_end, !self.morph)
+    }
+
+    /// Refines the quadtree, with a wider tolerance if there would be too many blocks: by what factor.
+    fn collapse(&mut self, view: &View) -> f64 {
         let mut wider = *view;
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.clear();
         loop {
-            let allowance = wider.allowance();
-            let sight = Sight { tree: &self.tree, allowance: &allowance, frustum: (!self.morph).then_some(&frustum) };
+            let sight = Sight::new(&self.tree, &wider, self.band_end, !self.morph);
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-                Collapse { sight, frustum: &frustum, refinement, seeds, cells: self.cells, single }.run(&mut drawn);
+                Collapse { sight: &sight, refinement, seeds, cells: self.cells, single }.run(&mut drawn);
                 break;
             }
             wider.tolerance.px = 1.5 * wider.tolerance.px.max(f64::MIN_POSITIVE);
         }
         self.drawn = drawn;
+        if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px }
     }
 
     /// A draw for each kind of cluster that occurs.
@@ -177,16 +196,26 @@ impl Technique for Clusters {
     }
 
     fn limits(&self) -> Limits {
-        let draws = if self.mode == Mode::Indirect { self.mesh.ranges.len() } else { self.most_blocks };
-        Limits { draws, instances: self.most_blocks, ..Limits::default() }
+        let is_instanced = matches!(self.mode, Mode::Indirect | Mode::GpuDriven);
+        let draws = if is_instanced { self.mesh.ranges.len() } else { self.most_drawn };
+        Limits { draws, instances: self.most_drawn, ..Limits::default() }
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.collapse(view);
+        list.widening = self.collapse(view);
         match self.mode {
-            Mode::Indirect => self.draw_instanced(list),
+            Mode::Indirect | Mode::GpuDriven => self.draw_instanced(list),
             Mode::DrawPerBlock | Mode::DrawPerCluster => self.draw_each(list),
         }
+    }
+
+    fn driver(&self) -> Option<&Driver> {
+        self.driver.as_ref()
+    }
+
+    fn parameters(&self, view: &View, words: &mut Vec<u32>) {
+        let sight = self.sight(view);
+        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&sight.view)));
     }
 
     fn keeps_tolerance(&self) -> bool {

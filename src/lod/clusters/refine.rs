@@ -12,138 +12,198 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::tree::{Known, Node, Tree, ratio};
+use super::sight::Sight;
+use super::tree::{Node, Tree};
 use crate::draw::weights::ONE;
-use crate::view::{Allowance, Containment, Frustum};
+use crate::view::Containment;
 
 /// A node that is split.
 #[derive(Clone, Copy, Debug)]
-struct Split {
-    at: [u32; 2],
-    ratio: f64,
+pub struct Split {
+    /// Which node.
+    pub node: Node,
+    /// What the tolerance allows over its ε.
+    ratio: f32,
+    /// Which of its children are blocks in sight, a bit each.
+    pub blocks: u32,
+    /// Those of its children that are split, by their place among the split nodes.
+    pub children: [Option<u32>; 4],
+}
+
+/// What is found under a node's parent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// Nothing to be drawn.
+    Nothing,
+    /// A block in sight.
+    Block,
+    /// A split node, by its place.
+    Split(u32),
 }
 
 /// The split nodes of a view.
 pub struct Refinement {
-    /// The end of the band that begins at 1.
-    end: f64,
     /// The most nodes that may be split.
     most: usize,
-    count: usize,
-    /// By level.
-    splits: Vec<Vec<Split>>,
-    index: HashMap<Node, u32, BuildHasherDefault<NodeHasher>>,
-}
-
-/// What a refinement is made from.
-#[derive(Clone, Copy)]
-pub struct Sight<'a> {
-    /// The quadtree.
-    pub tree: &'a Tree,
-    /// The view's tolerance.
-    pub allowance: &'a Allowance,
-    /// Nodes outside it are left as they are; `None`: none are, so that no turn of the eye changes what is seen.
-    pub frustum: Option<&'a Frustum>,
+    /// The split nodes.
+    pub splits: Vec<Split>,
+    /// Their places by level.
+    levels: Vec<Vec<u32>>,
+    index: HashMap<u64, u32, BuildHasherDefault<NodeHasher>>,
+    /// What the root is.
+    pub root: Found,
 }
 
 impl Refinement {
-    /// With a band from 1 to `end`, and at most `most` split nodes.
-    pub fn new(end: f64, most: usize) -> Self {
-        Self { end, most, count: 0, splits: Vec::new(), index: HashMap::default() }
+    /// With at most `most` split nodes.
+    pub fn new(most: usize) -> Self {
+        Self { most, splits: Vec::new(), levels: Vec::new(), index: HashMap::default(), root: Found::Nothing }
     }
 
     /// Finds the split nodes of a view. `false` if there would be too many.
     pub fn refine(&mut self, sight: &Sight) -> bool {
         let root = sight.tree.root();
-        self.splits.resize_with(root.level as usize + 1, Vec::new);
-        self.splits.iter_mut().for_each(Vec::clear);
+        self.levels.resize_with(root.level as usize + 1, Vec::new);
+        self.levels.iter_mut().for_each(Vec::clear);
+        self.splits.clear();
         self.index.clear();
-        self.count = 0;
-        self.descend(sight, root, sight.frustum.is_none());
-        for level in 1..root.level {
-            for k in 0..self.splits[level as usize].len() {
-                let Split { at, ratio } = self.splits[level as usize][k];
-                self.restrict(sight, Node { level, at }, ratio);
+        self.root = self.descend(sight, root, Containment::Crossing);
+        for level in 1..root.level as usize {
+            for k in 0..self.levels[level].len() {
+                let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
+                self.restrict(sight, node, ratio);
             }
         }
-        self.count <= self.most
+        self.splits.len() <= self.most
     }
 
-    fn descend(&mut self, sight: &Sight, node: Node, inside: bool) {
-        if node.level == 0 || self.count > self.most || !sight.tree.contains(node) {
-            return;
+    /// What a node is, in one that lies to what can be seen as `around` says.
+    fn descend(&mut self, sight: &Sight, node: Node, around: Containment) -> Found {
+        let Some(square) = sight.tree.square(node) else { return Found::Nothing };
+        let extent = sight.extent(node, square.range);
+        // What is in a node lies no other way than that, if it is not crossed by a plane.
+        let containment = if around == Containment::Crossing { sight.containment(&extent) } else { around };
+        if containment == Containment::Outside && sight.view.culls != 0 {
+            return Found::Nothing;
         }
-        let Some(known) = sight.tree.known(node) else { return };
-        let inside = inside
-            || match sight.frustum.map(|frustum| frustum.contains(&known.bounds)) {
-                Some(Containment::Outside) => return,
-                Some(Containment::Crossing) => false,
-                Some(Containment::Inside) | None => true,
-            };
-        let ratio = ratio(sight.allowance, &known);
-        if ratio >= self.end {
-            return;
+        if node.level > 0 && self.splits.len() <= self.most {
+            let ratio = sight.ratio(&extent, square.error);
+            if ratio < sight.view.band_end {
+                let k = self.insert(sight, node, ratio);
+                for quadrant in 0..4 {
+                    let found = self.descend(sight, node.child(quadrant), containment);
+                    self.splits[k as usize].hold(quadrant, found);
+                }
+                return Found::Split(k);
+            }
         }
-        self.insert(node, ratio);
-        (0..4).for_each(|quadrant| self.descend(sight, node.child(quadrant), inside));
+        block(is_in_sight(sight, node, containment))
     }
 
-    fn insert(&mut self, node: Node, ratio: f64) {
-        let splits = &mut self.splits[node.level as usize];
-        self.count += 1;
-        self.index.insert(node, splits.len() as u32);
-        splits.push(Split { at: node.at, ratio });
+    fn insert(&mut self, sight: &Sight, node: Node, ratio: f32) -> u32 {
+        let k = self.splits.len() as u32;
+        self.index.extend(node.id(sight.tree.root()).map(|id| (id, k)));
+        self.levels[node.level as usize].push(k);
+        self.splits.push(Split { node, ratio, blocks: 0, children: [None; 4] });
+        k
     }
 
     /// Keeps the coarser neighbours on a node's own outer sides within a level of it.
-    fn restrict(&mut self, sight: &Sight, node: Node, ratio: f64) {
+    fn restrict(&mut self, sight: &Sight, node: Node, ratio: f32) {
         for axis in 0..2 {
             // The first child's outer side is the first side.
             let side = axis + 2 * (node.at[axis] & 1) as usize;
             let Some(beyond) = node.beyond(side) else { continue };
             let coarser = beyond.parent();
-            if let Some(&k) = self.index.get(&coarser) {
-                let split = &mut self.splits[coarser.level as usize][k as usize];
+            if let Some(k) = self.find(sight.tree, coarser) {
+                let split = &mut self.splits[k as usize];
                 split.ratio = split.ratio.min(ratio);
             } else if sight.draws(coarser) {
-                self.insert(coarser, ratio);
+                self.split_leaf(sight, coarser, ratio);
             }
         }
     }
 
+    /// Splits a node that was a leaf, or in one.
+    fn split_leaf(&mut self, sight: &Sight, node: Node, ratio: f32) {
+        let k = self.insert(sight, node, ratio);
+        for quadrant in 0..4 {
+            let child = node.child(quadrant);
+            let found = match self.find(sight.tree, child) {
+                Some(place) => Found::Split(place),
+                None => block(self.is_leaf_in_sight(sight, child)),
+            };
+            self.splits[k as usize].hold(quadrant, found);
+        }
+        // A parent that is split later finds it.
+        if let Some(parent) = self.find(sight.tree, node.parent()) {
+            self.splits[parent as usize].hold(node.quadrant(), Found::Split(k));
+        }
+    }
+
+    fn is_leaf_in_sight(&self, sight: &Sight, node: Node) -> bool {
+        let Some(square) = sight.tree.square(node) else { return false };
+        is_in_sight(sight, node, sight.containment(&sight.extent(node, square.range)))
+    }
+
+    fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
+        self.index.get(&node.id(tree.root())?).copied()
+    }
+
     /// How far the blocks in a split node have gone over into it, below [`ONE`]; `None` if it is not split. Where
     /// a node sticks out of the field midpoints are none, so there they stay.
-    pub fn weight(&self, tree: &Tree, node: Node) -> Option<u32> {
-        let k = *self.index.get(&node)?;
-        let ratio = self.splits[node.level as usize][k as usize].ratio;
-        let part = ((ratio - 1.0) / (self.end - 1.0)).clamp(0.0, 1.0);
-        let stays = self.end == 1.0 || tree.is_partial(node);
-        Some(if stays { 0 } else { ((part * f64::from(ONE)) as u32).min(ONE - 1) })
+    pub fn weight(&self, sight: &Sight, node: Node) -> Option<u32> {
+        let k = self.find(sight.tree, node)?;
+        let part = (self.splits[k as usize].ratio - 1.0) * sight.view.band_scale;
+        let stays = sight.view.band_scale == 0.0 || sight.tree.is_partial(node);
+        Some(if stays { 0 } else { part.clamp(0.0, (ONE - 1) as f32) as u32 })
     }
 
     /// The weight of a side of a split node, the greater of its two nodes': from [`ONE`] on the other one is not
     /// split, and `ONE` stands for its own level. Where nothing is drawn beyond, the node's own.
     pub fn side_weight(&self, sight: &Sight, node: Node, side: usize) -> u32 {
-        let own = self.weight(sight.tree, node).unwrap_or(0);
+        let own = self.weight(sight, node).unwrap_or(0);
         let Some(beyond) = node.beyond(side) else { return own };
-        match self.weight(sight.tree, beyond) {
+        match self.weight(sight, beyond) {
             Some(weight) => own.max(weight),
             None if !sight.draws(beyond) => own,
-            None => ONE + self.weight(sight.tree, beyond.parent()).unwrap_or(0),
+            None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
         }
     }
 }
 
-impl Sight<'_> {
-    /// Whether a node has land, in sight if that matters.
-    fn draws(&self, node: Node) -> bool {
-        let in_sight =
-            |known: Known| self.frustum.is_none_or(|frustum| frustum.contains(&known.bounds) != Containment::Outside);
-        self.tree.contains(node) && self.tree.known(node).is_some_and(in_sight)
+impl Split {
+    fn hold(&mut self, quadrant: u32, found: Found) {
+        let k = quadrant as usize;
+        self.blocks &= !(1 << quadrant);
+        match found {
+            Found::Nothing => {}
+            Found::Block => self.blocks |= 1 << quadrant,
+            Found::Split(place) => self.children[k] = Some(place),
+        }
     }
 }
 
-/// A multiplication a word: nodes are few and small.
+fn block(is_seen: bool) -> Found {
+    if is_seen { Found::Block } else { Found::Nothing }
+}
+
+/// Whether any of the finest blocks in a node may be seen: with the box of the whole alone a coarse block might be
+/// drawn where finer ones are not, and a wider tolerance would draw more.
+fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
+    match containment {
+        Containment::Outside => false,
+        Containment::Inside => true,
+        Containment::Crossing => node.level == 0 || (0..4).any(|quadrant| {
+            let child = node.child(quadrant);
+            sight.tree.square(child).is_some_and(|square| {
+                is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
+            })
+        }),
+    }
+}
+
+/// A multiplication a node.
 #[derive(Clone, Copy, Default)]
 struct NodeHasher(u64);
 
@@ -153,14 +213,10 @@ impl Hasher for NodeHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&byte| self.write_u32(u32::from(byte)));
+        bytes.iter().for_each(|&byte| self.write_u64(byte.into()));
     }
 
-    fn write_u32(&mut self, word: u32) {
-        self.0 = (self.0 ^ u64::from(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
-    }
-
-    fn write_usize(&mut self, word: usize) {
-        self.write_u32(word as u32);
+    fn write_u64(&mut self, id: u64) {
+        self.0 = (self.0 ^ id).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }

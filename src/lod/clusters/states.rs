@@ -54,6 +54,11 @@ impl Seeds {
         seeds
     }
 
+    /// Seed and quarter turns of every state, by its number in base 3, the first quadrant's digit the lowest.
+    pub fn all(&self) -> [(u8, u8); 81] {
+        self.table
+    }
+
     /// The seed of a state, and the quarter turns that make it the state.
     pub fn of(&self, state: State) -> (usize, u32) {
         let (seed, turns) = self.table[number(state)];

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use crate::height::Field;
-use crate::height::bounds::{Bounds, Measure};
-use crate::view::{Aabb, Allowance};
+use crate::height::bounds::{Bounds, Measure, Square};
 
 /// A square of the quadtree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
     /// Level of the block that fills it.
     pub level: u32,
@@ -30,12 +29,25 @@ impl Node {
         Node { level: self.level + 1, at: self.at.map(|n| n / 2) }
     }
 
+    /// Which child of its parent it is.
+    pub fn quadrant(self) -> u32 {
+        (self.at[0] & 1) + 2 * (self.at[1] & 1)
+    }
+
     /// The node of the same level beyond a side, if it is not before the field's first sample.
     pub fn beyond(self, side: usize) -> Option<Node> {
         let mut at = self.at;
         let n = &mut at[side & 1];
         *n = if side < 2 { n.checked_sub(1)? } else { *n + 1 };
         Some(Node { at, ..self })
+    }
+
+    /// A number of its own among all nodes under a root: two bits for each level above it, and one. `None` beyond
+    /// the root.
+    pub fn id(self, root: Node) -> Option<u64> {
+        let above = root.level - self.level;
+        let is_under = self.at.iter().all(|n| n >> above == 0);
+        is_under.then(|| 1 << (2 * above) | u64::from(self.at[1]) << above | u64::from(self.at[0]))
     }
 }
 
@@ -50,20 +62,15 @@ pub enum Errors {
 
 /// The quadtree of a field.
 pub struct Tree {
-    bounds: Bounds,
+    /// What was measured of its squares.
+    pub bounds: Bounds,
     errors: Errors,
-    spacing: [f64; 2],
-    origin: [f64; 2],
-    last: [u32; 2],
-}
-
-/// What is known of a node with land.
-#[derive(Clone, Copy, Debug)]
-pub struct Known {
-    /// The box around it.
-    pub bounds: Aabb,
-    /// ε, metres.
-    pub error: f32,
+    /// Distance of neighbouring samples (x, z), metres.
+    pub spacing: [f64; 2],
+    /// Where the first sample lies (x, z), world metres.
+    pub origin: [f64; 2],
+    /// The last sample.
+    pub last: [u32; 2],
 }
 
 impl Tree {
@@ -96,10 +103,10 @@ impl Tree {
         node.at.map(|n| n * self.bounds.side(node.level))
     }
 
-    /// Whether a node has cells of the field.
-    pub fn contains(&self, node: Node) -> bool {
-        let first = self.first(node);
-        (0..2).all(|k| first[k] < self.last[k])
+    /// Lattice positions of a node's first and last vertex that are in the field.
+    pub fn corners(&self, node: Node) -> [[u32; 2]; 2] {
+        let (first, side) = (self.first(node), self.bounds.side(node.level));
+        [first, [0, 1].map(|k| (first[k] + side).min(self.last[k]))]
     }
 
     /// Whether a node sticks out of the field.
@@ -107,29 +114,21 @@ impl Tree {
         self.bounds.is_partial(node.level, node.at)
     }
 
-    /// What is known of a node of the field; `None` if it has no land.
-    pub fn known(&self, node: Node) -> Option<Known> {
+    /// What is known of a node; `None` if it has no land.
+    pub fn square(&self, node: Node) -> Option<Square> {
+        let first = self.first(node);
+        if (0..2).any(|k| first[k] >= self.last[k]) {
+            return None;
+        }
         let square = self.bounds.square(node.level, node.at);
-        square.has_land().then(|| {
-            let side = self.bounds.side(node.level);
-            let first = self.first(node);
-            let at = |k: usize, n: u32| self.origin[k] + f64::from(n.min(self.last[k])) * self.spacing[k];
-            let corner =
-                |add: u32, y: f32| glam::DVec3::new(at(0, first[0] + add), f64::from(y), at(1, first[1] + add));
-            let bounds = Aabb { min: corner(0, square.range[0]), max: corner(side, square.range[1]) };
-            Known { bounds, error: self.error(node.level, square.error) }
-        })
+        square.has_land().then(|| Square { error: self.error(node.level, square.error), ..square })
     }
 
-    fn error(&self, level: u32, measured: f32) -> f32 {
+    /// The error of a square of a level in which `measured` was measured.
+    pub fn error(&self, level: u32, measured: f32) -> f32 {
         match self.errors {
             Errors::Measured => measured,
             Errors::Halved(root) => root / (1u64 << (self.root().level - level)) as f32,
         }
     }
-}
-
-/// What the tolerance allows in a node over what it has: below 1 it is too coarse.
-pub fn ratio(allowance: &Allowance, known: &Known) -> f64 {
-    allowance.error(&known.bounds) / f64::from(known.error.max(f32::MIN_POSITIVE))
 }

@@ -1,0 +1,27 @@
+// Clusters, their commands and instances: src/lod/clusters/collapse.rs and states.rs.
+
+layout(set = 0, binding = 3, scalar) writeonly buffer InstanceBlock { Instance instances[]; };
+struct Command { uint index_count; uint instance_count; uint first_index; int vertex_offset; uint first_instance; };
+layout(set = 0, binding = 4, scalar) writeonly buffer CommandBlock { Tally tally; Command commands[]; };
+
+// What a quadrant holds.
+const uint NOTHING = 0;
+const uint BLOCK = 1;
+const uint FOUR_BLOCKS = 2;
+// Blocks in all quadrants.
+const uint ALL = 15;
+
+// The seed of a state's number, and its quarter turns.
+uint seed_of(uint state) {
+    return words[tree.states + state] & 255;
+}
+
+uint turns_of(uint state) {
+    return words[tree.states + state] >> 8;
+}
+
+// An instance at a node's first vertex, two mesh units a cell of a level.
+Instance placed(Node node, uint level) {
+    ivec2 origin = ivec2(node.at * side_of(node.level));
+    return Instance(origin, 4 * tree.cells, int(level) - 1, 0, level, 0, uvec4(0));
+}

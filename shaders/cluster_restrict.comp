@@ -1,0 +1,17 @@
+#version 460
+// Coarser neighbours of the split nodes of level `argument` are kept within a level of them: refine.rs, restrict.
+#extension GL_GOOGLE_include_directive : require
+#include "cluster_splits.glsl"
+
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= work[row(argument) + COUNT]) return;
+    uint place = place_in_level(argument, k);
+    Node node = node_at(place);
+    float ratio = uintBitsToFloat(work[tree.ratios + place]);
+    for (uint axis = 0; axis < 2; ++axis) {
+        Node other;
+        if (!beyond(node, axis + 2 * (node.at[axis] & 1), other)) continue;
+        if (draws(parent(other))) enter(parent(other), ratio);
+    }
+}

@@ -1,0 +1,233 @@
+//! Selection on the device: runs the programs of a [`Driver`], whose technique it does not know, and reads back what
+//! they found.
+
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+
+use super::bindings::{Bindings, Bound};
+use super::device::Gpu;
+use super::frames::{Recording, SLOTS, once};
+use super::memory::{Buffer, memory_barrier};
+use super::pipelines;
+use super::shaders::Constants;
+use super::terrain::{COMMAND, filled};
+use crate::draw::driver::{Groups, Step};
+use crate::draw::layout::{Instance, Tally};
+use crate::draw::{Draw, DrawList, Driver, Source, Submission, Topology};
+
+use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+
+const HEAD: usize = size_of::<Tally>();
+
+/// Pipelines, the table, and what each frame in flight writes.
+pub struct Driven {
+    gpu: Arc<Gpu>,
+    slots: Vec<Slot>,
+    pipelines: Vec<vk::Pipeline>,
+    scratch: Buffer,
+    _table: Buffer,
+    steps: Vec<Step>,
+    draws: usize,
+    /// The slot of the newest frame.
+    newest: usize,
+}
+
+struct Slot {
+    bindings: Bindings,
+    parameters: Buffer,
+    instances: Buffer,
+    commands: Buffer,
+    /// A copy of the commands for the host.
+    found: Buffer,
+    has_run: bool,
+}
+
+impl Driven {
+    /// Makes what a driver needs. The device must count draws ([`Gpu::counts_draws`]).
+    pub fn new(gpu: &Arc<Gpu>, driver: &Driver) -> Result<Self> {
+        use vk::BufferUsageFlags as Usage;
+        let table = filled(gpu, "selection table", bytemuck::cast_slice(&driver.table), Usage::STORAGE_BUFFER)?;
+        let usage = Usage::STORAGE_BUFFER | Usage::INDIRECT_BUFFER;
+        let scratch = Buffer::device(gpu, "selection scratch", 4 * driver.scratch as u64, usage)?;
+        let slots = (0..SLOTS).map(|_| Slot::new(gpu, driver, &table, &scratch)).collect::<Result<_>>()?;
+        let (gpu, steps, draws) = (Arc::clone(gpu), driver.steps.clone(), driver.draws);
+        let mut driven = Self { gpu, slots, pipelines: Vec::new(), scratch, _table: table, steps, draws, newest: 0 };
+        for program in driver.programs {
+            let layout = driven.slots[0].bindings.layout;
+            let pipeline = pipelines::compute(&driven.gpu, layout, program, program, &Constants::new(&[]))?;
+            driven.pipelines.push(pipeline);
+        }
+        Ok(driven)
+    }
+
+    /// Records the selection for a view told by its parameters: before the target begins.
+    pub fn select(&mut self, recording: &mut Recording, parameters: &[u32]) -> Result<()> {
+        self.newest = recording.slot;
+        let slot = &mut self.slots[self.newest];
+        slot.parameters.write(0, bytemuck::cast_slice(parameters));
+        slot.has_run = true;
+        recording.scope("select", |r| {
+            self.record(r);
+            Ok(())
+        })
+    }
+
+    fn record(&self, r: &Recording) {
+        let slot = &self.slots[r.slot];
+        let (raw, point) = (&self.gpu.raw, vk::PipelineBindPoint::COMPUTE);
+        let working = Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE;
+        let steps = (Stage::COMPUTE_SHADER | Stage::TRANSFER, working | Access::TRANSFER_WRITE);
+        let reading = (Stage::COMPUTE_SHADER | Stage::DRAW_INDIRECT, working | Access::INDIRECT_COMMAND_READ);
+        // Frames before may still work in the scratch.
+        memory_barrier(&self.gpu, r.commands, (steps.0 | reading.0, steps.1), steps);
+        // SAFETY: what is bound outlives the frame.
+        unsafe {
+            raw.cmd_bind_descriptor_sets(r.commands, point, slot.bindings.layout, 0, &[slot.bindings.set], &[]);
+        }
+        for step in &self.steps {
+            match step {
+                Step::Fill(words, value) => {
+                    let (first, bytes) = (4 * words.start as u64, 4 * words.len() as u64);
+                    // SAFETY: the words lie in the scratch.
+                    unsafe { raw.cmd_fill_buffer(r.commands, self.scratch.raw, first, bytes, *value) };
+                }
+                Step::Run { program, groups, argument } => {
+                    memory_barrier(&self.gpu, r.commands, steps, reading);
+                    self.run(r, slot, *program, *groups, *argument);
+                }
+            }
+        }
+        let used = (
+            Stage::DRAW_INDIRECT | Stage::VERTEX_ATTRIBUTE_INPUT | Stage::COPY,
+            Access::INDIRECT_COMMAND_READ | Access::VERTEX_ATTRIBUTE_READ | Access::TRANSFER_READ,
+        );
+        memory_barrier(&self.gpu, r.commands, (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE), used);
+        let region = [vk::BufferCopy { size: slot.found.size, ..Default::default() }];
+        // SAFETY: both buffers are of this size and live until the frame has ended.
+        unsafe { raw.cmd_copy_buffer(r.commands, slot.commands.raw, slot.found.raw, &region) };
+        let copied = (Stage::COPY, Access::TRANSFER_WRITE);
+        memory_barrier(&self.gpu, r.commands, copied, (Stage::HOST, Access::HOST_READ));
+    }
+
+    fn run(&self, r: &Recording, slot: &Slot, program: usize, groups: Groups, argument: u32) {
+        let (raw, stage) = (&self.gpu.raw, vk::ShaderStageFlags::COMPUTE);
+        // SAFETY: the pipelines outlive the frame; group counts lie in the scratch.
+        unsafe {
+            raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::COMPUTE, self.pipelines[program]);
+            raw.cmd_push_constants(r.commands, slot.bindings.layout, stage, 0, &argument.to_ne_bytes());
+            match groups {
+                Groups::One => raw.cmd_dispatch(r.commands, 1, 1, 1),
+                Groups::Counted(word) => raw.cmd_dispatch_indirect(r.commands, self.scratch.raw, 4 * word as u64),
+            }
+        }
+    }
+
+    /// The instances of a frame.
+    pub(super) fn instances(&self, r: &Recording) -> vk::Buffer {
+        self.slots[r.slot].instances.raw
+    }
+
+    /// Records the draws that were found.
+    pub(super) fn draw(&self, r: &Recording) {
+        let commands = self.slots[r.slot].commands.raw;
+        // SAFETY: the buffer holds a count and at most that many commands.
+        unsafe {
+            let (raw, most) = (&self.gpu.raw, self.draws as u32);
+            raw.cmd_draw_indexed_indirect_count(r.commands, commands, HEAD as u64, commands, 0, most, COMMAND as u32);
+        }
+    }
+
+    /// Records some of the draws that were found: one that is not there would be an old one.
+    pub(super) fn draw_some(&self, r: &Recording, draws: std::ops::Range<usize>) {
+        let (first, commands) = ((HEAD + draws.start * COMMAND) as u64, self.slots[r.slot].commands.raw);
+        let count = draws.len() as u32;
+        // SAFETY: the buffer holds these commands.
+        unsafe { self.gpu.raw.cmd_draw_indexed_indirect(r.commands, commands, first, count, COMMAND as u32) };
+    }
+
+    /// Fills a list with the draws that the newest frame of a slot found, once it has finished, and no instances.
+    /// Before the first frame it is left as it is.
+    pub fn read_draws(&self, slot: usize, list: &mut DrawList) {
+        if !self.slots[slot].has_run {
+            return;
+        }
+        let found = self.slots[slot].found.read();
+        let tally: Tally = bytemuck::pod_read_unaligned(&found[..HEAD]);
+        let commands = found[HEAD..].chunks_exact(COMMAND).take(tally.draws as usize);
+        list.draws = commands.map(draw).collect();
+        list.instances.clear();
+        list.submission = Submission::Driven;
+        list.widening = if tally.overflow == 0 { 1.0 } else { f64::INFINITY };
+    }
+
+    /// The slot of the newest frame.
+    pub fn newest(&self) -> usize {
+        self.newest
+    }
+
+    /// The first instances of the newest frame, once it has finished.
+    pub fn read_instances(&self, count: usize) -> Result<Vec<Instance>> {
+        let bytes = count * size_of::<Instance>();
+        let instances = &self.slots[self.newest].instances;
+        if bytes as u64 > instances.size {
+            bail!("selection: {count} instances were found, {} bytes hold them", instances.size);
+        }
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        let copy = Buffer::new(&self.gpu, "instances read back", bytes as u64, usage, MemoryLocation::GpuToCpu)?;
+        if count > 0 {
+            once(&self.gpu, |r| {
+                let written = (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE);
+                memory_barrier(&self.gpu, r.commands, written, (Stage::COPY, Access::TRANSFER_READ));
+                let region = [vk::BufferCopy { size: bytes as u64, ..Default::default() }];
+                // SAFETY: both buffers outlive the wait in `once`.
+                unsafe { self.gpu.raw.cmd_copy_buffer(r.commands, instances.raw, copy.raw, &region) };
+                let copied = (Stage::COPY, Access::TRANSFER_WRITE);
+                memory_barrier(&self.gpu, r.commands, copied, (Stage::HOST, Access::HOST_READ));
+                Ok(())
+            })?;
+        }
+        Ok(bytemuck::pod_collect_to_vec(&copy.read()[..bytes]))
+    }
+}
+
+/// A command as the draw that it is.
+fn draw(command: &[u8]) -> Draw {
+    let [indices, instances, first_index, _, first_instance]: [u32; 5] = bytemuck::pod_read_unaligned(command);
+    Draw {
+        source: Source::Lattice,
+        topology: Topology::Triangles,
+        indices: first_index..first_index + indices,
+        instances: first_instance..first_instance + instances,
+    }
+}
+
+impl Slot {
+    fn new(gpu: &Arc<Gpu>, driver: &Driver, table: &Buffer, scratch: &Buffer) -> Result<Self> {
+        use vk::BufferUsageFlags as Usage;
+        let storage = Usage::STORAGE_BUFFER | Usage::TRANSFER_SRC;
+        let parameters = Buffer::host(gpu, "selection parameters", 4 * driver.parameters as u64, Usage::STORAGE_BUFFER)?;
+        let bytes = (driver.instances * size_of::<Instance>()) as u64;
+        let instances = Buffer::device(gpu, "selected instances", bytes, storage | Usage::VERTEX_BUFFER)?;
+        let bytes = (HEAD + driver.draws * COMMAND) as u64;
+        let commands = Buffer::device(gpu, "selected commands", bytes, storage | Usage::INDIRECT_BUFFER)?;
+        let found = Buffer::new(gpu, "selection read back", bytes, Usage::TRANSFER_DST, MemoryLocation::GpuToCpu)?;
+        let bound = [table, &parameters, scratch, &instances, &commands].map(Bound::Storage);
+        let bindings = Bindings::new(gpu, "selection", None, vk::ShaderStageFlags::COMPUTE, &bound, 4)?;
+        Ok(Self { bindings, parameters, instances, commands, found, has_run: false })
+    }
+}
+
+impl Drop for Driven {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in use once the device is idle.
+        unsafe {
+            let _ = self.gpu.raw.device_wait_idle();
+            for pipeline in &self.pipelines {
+                self.gpu.raw.destroy_pipeline(*pipeline, None);
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Selection on the device draws what the host's draws: the same instances of the same kinds, in every view.
+
+use std::sync::Arc;
+
+use cuesta::bench::paths;
+use cuesta::draw::{DrawList, Submission};
+use cuesta::gpu::Gpu;
+use cuesta::height::{Field, Holes, Samples, demo, synth};
+use cuesta::lod::Technique;
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+
+use super::{mountains, on_device, technique};
+
+const SIZE: [u32; 2] = [320, 180];
+
+type Set = Vec<([u32; 2], Vec<u32>)>;
+
+/// Instances with their kind, in an order of their own. The batch is a place in the list, and that is no matter.
+fn set(list: &DrawList) -> Set {
+    let of_draw = |draw: &cuesta::draw::Draw| {
+        let range = [draw.indices.start, draw.indices.end];
+        list.instances[draw.instances.start as usize..draw.instances.end as usize].iter().map(move |instance| {
+            let alike = cuesta::draw::Instance { batch: 0, ..*instance };
+            (range, bytemuck::cast_slice(bytemuck::bytes_of(&alike)).to_vec())
+        })
+    };
+    let mut all: Vec<_> = list.draws.iter().flat_map(of_draw).collect();
+    all.sort_unstable();
+    all
+}
+
+fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
+    let look = Look::default();
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
+}
+
+/// Holds both selections against each other in all views; how many instances there were.
+fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, settings: &[&str], views: &[View]) -> usize {
+    let mut technique = technique(field, "clusters:gpu-driven", settings);
+    let mut stage = stage(gpu, field, technique.as_ref());
+    let mut instances = 0;
+    for view in views {
+        stage.draw(technique.as_mut(), view, Copy::Nothing).unwrap();
+        stage.complete().unwrap();
+        assert_eq!((stage.list.submission, stage.list.widening), (Submission::Driven, 1.0));
+        let mut list = DrawList::default();
+        technique.select(view, &mut list);
+        let (device, host) = (set(&stage.list), set(&list));
+        let is_alike = device == host;
+        let only = |a: &Set, b: &Set| a.iter().filter(|one| !b.contains(one)).take(3).cloned().collect::<Set>();
+        assert!(
+            is_alike,
+            "{settings:?}: {} instances on the device ({:?} alone), {} on the host ({:?} alone), {view:?}",
+            device.len(),
+            only(&device, &host),
+            host.len(),
+            only(&host, &device)
+        );
+        let commands: Vec<_> = stage.list.draws.iter().map(|d| (d.indices.clone(), d.instances.clone())).collect();
+        let expected: Vec<_> = list.draws.iter().map(|d| (d.indices.clone(), d.instances.clone())).collect();
+        assert_eq!(commands, expected, "the same commands");
+        let batches = |list: &DrawList| list.instances.iter().map(|instance| instance.batch).collect::<Vec<_>>();
+        assert_eq!(batches(&stage.list), batches(&list), "each instance knows its place");
+        instances += host.len();
+    }
+    instances
+}
+
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*seed >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// From within the field or beside it, through a pinhole or along parallel rays, under both metrics.
+fn anywhere(field: &Field, seed: &mut u64) -> View {
+    let [w, h] = field.size().map(f64::from);
+    let place = |n: f64, seed: &mut u64| n * (1.2 * random(seed) - 0.1);
+    let extent = w * field.spacing[0] + h * field.spacing[1];
+    let (x, z) = (place(w, seed), place(h, seed));
+    let eye = field.world_at(x, z, f64::from(field.statistics().mean) + extent * random(seed).powi(4));
+    let lens = match random(seed) {
+        p if p < 0.3 => Lens::Orthographic { width: 2.0 * extent * random(seed).powi(2), far: 1e9 },
+        _ => Lens::Perspective { fov_x: 0.02 + 2.0 * random(seed) },
+    };
+    View {
+        eye,
+        world_from_eye: View::turned(360.0 * random(seed), 120.0 * random(seed) - 90.0, 20.0 * random(seed)),
+        lens,
+        size: SIZE,
+        near: 0.1,
+        tolerance: Tolerance {
+            px: 0.3 + 12.0 * random(seed).powi(3),
+            metric: if random(seed) < 0.7 { Metric::Certified } else { Metric::Paper },
+        },
+    }
+}
+
+/// Smooth in one half and rough in the other.
+fn half_rough(size: [u32; 2]) -> Field {
+    let land = synth::synth(synth::Kind::Fractal, size, 7);
+    let mut seed = 1;
+    let height = |k: usize| {
+        let rough = if k % size[0] as usize > size[0] as usize / 2 { 4.0 * random(&mut seed) as f32 } else { 0.0 };
+        land.samples().height(k) + rough
+    };
+    let count = (size[0] * size[1]) as usize;
+    let mut field = Field::new(Samples::F32((0..count).map(height).collect()), size, [5.0, 5.0], Holes::none(count));
+    field.origin = [3.0e6, -1.0e6];
+    field
+}
+
+#[test]
+fn on_every_frame_of_a_path_device_and_host_select_alike() {
+    on_device(|gpu| {
+        let (demo, rough) = (Arc::new(demo::demo()), Arc::new(half_rough([600, 513])));
+        for (name, field) in [("demo", demo), ("rough", rough)] {
+            for path in ["skim", "circle"] {
+                for settings in [["block=16", "morph=off"], ["block=8", "morph=on"]] {
+                    let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
+                    let views = paths::find(path).unwrap().views(&field, 24, SIZE, tolerance);
+                    let instances = compare(gpu, &field, &settings, &views);
+                    println!("{name}, {path}, {settings:?}: {instances} instances");
+                    assert!(instances > 24 * 20, "{name}, {path}: only {instances} instances");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn from_anywhere_on_any_field_device_and_host_select_alike() {
+    on_device(|gpu| {
+        let holed = mountains();
+        let tiled = |tiles| Arc::new((*holed).clone().tiled(tiles));
+        let aligned = Arc::new(synth::synth(synth::Kind::Fractal, [128, 64], 3).tiled([3907, 7813]));
+        let fields = [
+            ("holes", Arc::clone(&holed)),
+            ("tiled", tiled([3, 2])),
+            ("tiled along one axis", tiled([1, 4])),
+            ("500 000² samples", aligned),
+            ("long", Arc::new(half_rough([900, 70]))),
+            ("one block", Arc::new(half_rough([9, 9]))),
+        ];
+        let mut seed = 2;
+        for (name, field) in fields {
+            let views: Vec<_> = (0..25).map(|_| anywhere(&field, &mut seed)).collect();
+            for block in ["block=8", "block=16", "block=32", "block=64", "block=128"] {
+                for setting in ["morph=off", "morph=on", "error=halved"] {
+                    // A morph all around a field without end is more than any list holds.
+                    if name.starts_with("500") && setting == "morph=on" {
+                        continue;
+                    }
+                    let instances = compare(gpu, &field, &[block, setting], &views);
+                    println!("{name}, {block}, {setting}: {instances} instances");
+                }
+            }
+        }
+    });
+}
