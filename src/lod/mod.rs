@@ -9,7 +9,7 @@ pub mod settings;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Geometry, Limits};
+use crate::draw::{DrawList, Geometry, Limits, Seams};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -32,6 +32,11 @@ pub trait Technique: Send {
     /// onto coarser sides.
     fn morphs(&self) -> bool {
         false
+    }
+
+    /// How its meshes meet: which of the two proofs its lists pass ([`watertight`](crate::measure::watertight)).
+    fn seams(&self) -> Seams {
+        Seams::Shared
     }
 
     /// What is worth knowing about the data it prepared: name, value, unit.

@@ -11,17 +11,20 @@
 //!   `draw-per-cluster`; its baseline is `draw-per-block`: the same triangles, a draw a block;
 //! - with the metric `certified` the error is a bound, which eq. 1 is not off the view axis;
 //! - neighbours are within one level of each other, and a side that meets a coarser block falls onto its edge: no
-//!   skirts are needed;
+//!   skirts are needed. With `seams=skirts` it is as published, and only the skirts' depth is not: it follows from
+//!   the errors of both sides and is 0 where nothing differs;
 //! - with `morph=on` the blocks in a node go over into it as eq. 3 and 4 have it, with a weight for each quadrant:
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
-//!   of their own, those of the coarser of their two blocks, so that both agree on them;
+//!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
-//! Laws kept: watertight, covered once, error within tolerance (`error=measured`), no state between views.
+//! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
+//! (`error=measured`), no state between views.
 
 mod collapse;
 pub mod mesh;
 mod refine;
+mod skirts;
 pub mod states;
 mod tree;
 
@@ -30,10 +33,11 @@ use std::sync::Arc;
 use self::collapse::Collapse;
 use self::mesh::Mesh;
 use self::refine::{Refinement, Sight};
+use self::skirts::Skirts;
 use self::states::Seeds;
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Seams, Source, Submission, Topology};
 use crate::height::Field;
 use crate::height::bounds::Measure;
 use crate::view::View;
@@ -73,6 +77,12 @@ pub const ENTRY: Entry = Entry {
             default: "off",
             about: "whether blocks go over into their parent, or change at once",
         },
+        Setting {
+            key: "seams",
+            values: Values::Words(&["stitched", "skirts"]),
+            default: "stitched",
+            about: "where blocks meet: on common edges, or with skirts under edges of their own, as published",
+        },
     ],
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };
@@ -94,6 +104,7 @@ struct Clusters {
     mode: Mode,
     cells: u32,
     morph: bool,
+    seams: Seams,
     measured: bool,
     /// Seed and instance of what is drawn.
     drawn: Vec<(u32, Instance)>,
@@ -103,6 +114,7 @@ impl Clusters {
     fn new(field: &Arc<Field>, settings: &Settings) -> Self {
         let cells = settings.number("block") as u32;
         let morph = settings.word("morph") == "on";
+        let seams = if settings.word("seams") == "skirts" { Seams::Skirts } else { Seams::Shared };
         let measured = settings.word("error") == "measured";
         let mode = match settings.variant() {
             Some("draw-per-block") => Mode::DrawPerBlock,
@@ -112,12 +124,12 @@ impl Clusters {
         let band = if morph { MORPH_RATIO } else { 1.0 };
         let tree = Tree::new(field, Measure { cells, growth: band as f32, errors: measured, morph }, !measured);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
-        let mesh = Mesh::new(cells as i32, &seeds.states);
+        let mesh = Mesh::new(cells as i32, &seeds.states, seams);
         // A quadtree has at most three leaves more for each split node.
         let most_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MOST_BLOCKS / 3);
         let most_blocks = tree.nodes(0).min(3 * most_splits + 1);
         let refinement = Refinement::new(band, most_splits);
-        Self { most_blocks, tree, seeds, mesh, refinement, mode, cells, morph, measured, drawn: Vec::new() }
+        Self { most_blocks, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn: Vec::new() }
     }
 
     /// Refines the quadtree, with a wider tolerance if there would be too many blocks.
@@ -131,7 +143,9 @@ impl Clusters {
             let sight = Sight { tree: &self.tree, allowance: &allowance, frustum: (!self.morph).then_some(&frustum) };
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-                Collapse { sight, frustum: &frustum, refinement, seeds, cells: self.cells, single }.run(&mut drawn);
+                let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(sight, refinement, view));
+                let cells = self.cells;
+                Collapse { sight, frustum: &frustum, refinement, seeds, cells, single, skirts }.run(&mut drawn);
                 break;
             }
             wider.tolerance.px = 1.5 * wider.tolerance.px.max(f64::MIN_POSITIVE);
@@ -196,6 +210,10 @@ impl Technique for Clusters {
     fn morphs(&self) -> bool {
         // Without morphing too: sides that meet a coarser block fall onto its edge.
         true
+    }
+
+    fn seams(&self) -> Seams {
+        self.seams
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -136,7 +136,7 @@ impl Refinement {
 
 impl Sight<'_> {
     /// Whether a node has land, in sight if that matters.
-    fn draws(&self, node: Node) -> bool {
+    pub fn draws(&self, node: Node) -> bool {
         let in_sight =
             |known: Known| self.frustum.is_none_or(|frustum| frustum.contains(&known.bounds) != Containment::Outside);
         self.tree.contains(node) && self.tree.known(node).is_some_and(in_sight)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::height::Field;
-use crate::height::bounds::{Bounds, Measure};
+use crate::height::bounds::{Bounds, Measure, Square};
 use crate::view::{Aabb, Allowance};
 
 /// A square of the quadtree.
@@ -119,6 +119,19 @@ impl Tree {
             let bounds = Aabb { min: corner(0, square.range[0]), max: corner(side, square.range[1]) };
             Known { bounds, error: self.error(node.level, square.error) }
         })
+    }
+
+    /// The most, metres, by which a node's surface is off the samples, whatever its error is taken for, and the
+    /// most by which two samples in it differ.
+    pub fn deviation(&self, node: Node) -> [f32; 2] {
+        let Square { error, range: [low, high] } = self.bounds.square(node.level, node.at);
+        let apart = (high - low).next_up();
+        [if self.errors == Errors::Measured { error } else { apart }, apart]
+    }
+
+    /// Length of the longer side of a cell, metres.
+    pub fn cell_m(&self, level: u32) -> f64 {
+        self.spacing[0].max(self.spacing[1]) * f64::from(1u32 << level)
     }
 
     fn error(&self, level: u32, measured: f32) -> f32 {
