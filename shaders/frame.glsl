@@ -13,3 +13,5 @@ layout(constant_id = 1) const bool TILED = false;
 layout(constant_id = 2) const uint PAGE_SHIFT = 0;
 // Lattice vertices have weights: they go over to the next coarser level, or fall onto coarser sides.
 layout(constant_id = 7) const bool MORPH = false;
+// Lattice meshes have skirts.
+layout(constant_id = 8) const bool SKIRTS = false;

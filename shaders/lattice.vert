@@ -10,9 +10,6 @@ layout(location = 0) in ivec2 in_position;
 
 void main() {
     Instance instance = instance_attributes();
-    ivec2 turned = turned_position(instance, in_position);
-    if (MORPH) turned = stitched_position(instance, turned);
-    float height = MORPH ? lattice_height(instance, turned) : sampled_height(instance, turned);
-    int level = MORPH ? vertex_level(instance, turned) : int(instance.level);
-    emit_vertex(lattice_position(instance, turned), height, uint(level), instance.batch);
+    Placed placed = placed(instance, in_position);
+    emit_vertex(placed.at, placed.height, placed.level, instance.batch);
 }

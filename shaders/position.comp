@@ -16,11 +16,13 @@ void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= queries.length()) return;
     Query query = queries[k];
-    ivec2 turned = turned_position(query.instance, query.vertex.position);
-    if (MORPH && query.explicit_height == 0) turned = stitched_position(query.instance, turned);
-    float height;
-    if (query.explicit_height != 0) height = morphed_height(query.vertex.height, query.vertex.target, query.vertex.morph);
-    else if (MORPH) height = lattice_height(query.instance, turned);
-    else height = sampled_height(query.instance, turned);
-    answers[k] = relative_position(lattice_position(query.instance, turned), height);
+    ExplicitVertex vertex = query.vertex;
+    if (query.explicit_height == 0) {
+        Placed placed = placed(query.instance, vertex.position);
+        answers[k] = relative_position(placed.at, placed.height);
+    } else {
+        float height = morphed_height(vertex.height, vertex.target, vertex.morph);
+        ivec2 turned = turned_position(query.instance, vertex.position);
+        answers[k] = relative_position(lattice_position(query.instance, turned), height);
+    }
 }

@@ -22,6 +22,9 @@ float sample_height(ivec2 at) {
     return decoded_height(texelFetch(height_pages, texel(at), 0).r);
 }
 
+// Lattice position, height in metres, level of detail.
+struct Placed { ivec2 at; float height; uint level; };
+
 ivec2 turned_position(Instance instance, ivec2 position) {
     int cells = int(instance.cells);
     if (instance.turns == 1) return ivec2(cells - position.y, position.x);
@@ -141,19 +144,78 @@ float end_height(Instance instance, ivec2 turned) {
     return is_outer(slot(instance, turned)) ? edge_height(instance, turned) : sampled_height(instance, turned);
 }
 
+ivec2 half_edge(Instance instance, ivec2 turned, int level) {
+    int unit = 1 << (level - instance.shift);
+    ivec2 apart = turned & unit;
+    if (apart == ivec2(unit)) {
+        ivec2 cell = (instance.origin + scaled(instance, turned)) >> (level + 1);
+        if (((cell.x + cell.y) & 1) == 1) apart.y = -apart.y;
+    }
+    return apart;
+}
+
 float lattice_height(Instance instance, ivec2 turned) {
     ivec2 slot = slot(instance, turned);
     if (is_outer(slot)) return edge_height(instance, turned);
     float sampled = sampled_height(instance, turned);
     uint weight = get(instance, slot) & ~FINER;
-    int unit = step_at(instance, turned);
-    ivec2 apart = turned & unit;
+    ivec2 apart = half_edge(instance, turned, vertex_level(instance, turned));
     if (weight == 0 || apart == ivec2(0)) return sampled;
-    if (apart.x == apart.y) {
-        int coarser = vertex_level(instance, turned) + 1;
-        ivec2 cell = (instance.origin + scaled(instance, turned)) >> coarser;
-        if (((cell.x + cell.y) & 1) == 1) apart.y = -apart.y;
-    }
     float target = midpoint(end_height(instance, turned - apart), end_height(instance, turned + apart));
     return morphed_height(sampled, target, unit_weight(weight));
+}
+
+// Meshes with skirts: src/draw/skirts.rs.
+const uint SKIRT = 1u << 31;
+
+bool is_skirted(Instance instance) {
+    return SKIRTS && (instance.cells & 1) == 1;
+}
+
+// Mesh units, quadrant, and the side that a skirt's vertex is beyond; −1: it is none.
+struct Hung { ivec2 at; int quadrant; int side; };
+
+Hung hung(Instance instance, ivec2 turned) {
+    int lines = (int(instance.cells) + 1) / 2;
+    ivec2 half_at = turned / lines;
+    ivec2 place = turned % lines - 1;
+    int last = lines - 3;
+    ivec2 at = half_at * last + clamp(place, 0, last);
+    int side = place.x < 0 ? 0 : place.x > last ? 2 : place.y < 0 ? 1 : place.y > last ? 3 : -1;
+    return Hung(at, half_at.x + 2 * half_at.y, side);
+}
+
+int quadrant_level(Instance instance, int quadrant) {
+    return int(instance.level) - ((get(instance, ivec2(0, quadrant)) & FINER) != 0 ? 1 : 0);
+}
+
+float skirt_depth(Instance instance, Hung hung) {
+    if (hung.side < 0 || ((instance.weights.y >> (4 * hung.quadrant + hung.side)) & 1) == 0) return 0.0;
+    return uintBitsToFloat(instance.weights.z);
+}
+
+float quadrant_height(Instance instance, ivec2 at, int level, uint weight) {
+    ivec2 apart = half_edge(instance, at, level);
+    float sampled = sampled_height(instance, at);
+    if (weight == 0 || apart == ivec2(0)) return sampled;
+    float target = midpoint(sampled_height(instance, at - apart), sampled_height(instance, at + apart));
+    return morphed_height(sampled, target, unit_weight(weight));
+}
+
+Placed hung_vertex(Instance instance, ivec2 turned) {
+    Hung hung = hung(instance, turned);
+    int level = quadrant_level(instance, hung.quadrant);
+    uint weight = get(instance, ivec2(0, hung.quadrant)) & ~FINER;
+    precise float height = quadrant_height(instance, hung.at, level, weight) - skirt_depth(instance, hung);
+    return Placed(lattice_position(instance, hung.at), height, uint(level) | (hung.side < 0 ? 0 : SKIRT));
+}
+
+// Where an instance draws a vertex of its mesh.
+Placed placed(Instance instance, ivec2 position) {
+    ivec2 turned = turned_position(instance, position);
+    if (is_skirted(instance)) return hung_vertex(instance, turned);
+    if (!MORPH) return Placed(lattice_position(instance, turned), sampled_height(instance, turned), instance.level);
+    turned = stitched_position(instance, turned);
+    float height = lattice_height(instance, turned);
+    return Placed(lattice_position(instance, turned), height, uint(vertex_level(instance, turned)));
 }

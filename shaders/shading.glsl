@@ -113,7 +113,7 @@ vec3 land_colour(vec3 relative, vec2 lattice, uvec2 level_batch) {
     float height = (relative.y - frame.anchor_height_relative) + frame.anchor_height;
 
     vec3 albedo;
-    if (COLOUR == 1) albedo = palette(level_batch.x);
+    if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
     else if (COLOUR == 2) albedo = texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
     else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell)) / max(pixel, 1e-30));
     else if (COLOUR == 5) albedo = palette(level_batch.y);

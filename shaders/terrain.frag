@@ -13,5 +13,7 @@ layout(location = 0) out vec4 out_colour;
 
 void main() {
     if (is_open(in_lattice)) discard;
-    out_colour = vec4(land_colour(in_relative, in_lattice, in_level_batch), 1.0);
+    // Alpha tells a skirt from the surface.
+    bool is_skirt = SKIRTS && (in_level_batch.x & SKIRT) != 0;
+    out_colour = vec4(land_colour(in_relative, in_lattice, in_level_batch), is_skirt ? 0.5 : 1.0);
 }

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use crate::draw::Seams;
 use crate::draw::layout::Frame;
 use crate::height::{Field, Samples};
 use crate::view::{Lens, View};
@@ -77,6 +78,8 @@ pub struct ScenePlan {
     pub filtered: bool,
     /// Lattice vertices have weights: they go over to the next coarser level, or fall onto coarser sides.
     pub morph: bool,
+    /// Lattice meshes have skirts.
+    pub skirts: bool,
     /// Timestamps and pipeline statistics are taken.
     pub measured: bool,
     /// Samples stored along (x, z).
@@ -109,6 +112,7 @@ impl ScenePlan {
             page_shift,
             filtered: device.filters_heights && page_shift == 0,
             morph: false,
+            skirts: false,
             measured: true,
             stored,
         };
@@ -128,6 +132,11 @@ impl ScenePlan {
     /// The plan for a technique that morphs, or does not.
     pub fn with_morph(self, morph: bool) -> Self {
         Self { morph, ..self }
+    }
+
+    /// The plan for a technique whose meshes meet like this.
+    pub fn with_seams(self, seams: Seams) -> Self {
+        Self { skirts: seams == Seams::Skirts, ..self }
     }
 
     /// Texels of a page of the height texture (x, z).
@@ -177,6 +186,7 @@ impl ScenePlan {
                 "no lattice vertex moves",
                 0,
             ),
+            sort(self.skirts, "skirts", "meshes have edges of their own", "meshes share their edges", 0),
             sort(self.fog, "fog", "asked for", "density 0", 0),
             sort(overlay, "overlay", "asked for", "no picture is laid over", 0),
             sort(self.wireframe, "wireframe", "asked for", "faces are filled", 0),

@@ -9,14 +9,16 @@ use anyhow::{Context, Result, anyhow};
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
 use super::run::{Frame, Laboratory, Scene, Timed};
+use crate::draw::expand::{self, Drawn};
 use crate::draw::layout;
-use crate::draw::{DrawList, Geometry, expand};
+use crate::draw::{DrawList, Geometry};
 use crate::gpu::Gpu;
 use crate::height::Field;
 use crate::lod::{self, Settings, Technique};
 use crate::measure::{economy, geometric, pop, watertight};
 use crate::plan::{self, Look, ScenePlan};
-use crate::scene::holes::{Truth, covered};
+use crate::scene::capture::AsDrawn;
+use crate::scene::holes::{Truth, covered, skirts};
 use crate::scene::{self, Copy, Stage};
 use crate::view::View;
 
@@ -39,7 +41,7 @@ impl DeviceLaboratory {
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_morph(technique.morphs()))
+        Ok(plan.with_morph(technique.morphs()).with_seams(technique.seams()))
     }
 
     /// A technique as it is when just made, and its stage.
@@ -165,19 +167,23 @@ fn look(
 ) -> Result<()> {
     let (view, field, resident) = (&scene.views[frame], scene.field, technique.resident());
     let picture = stage.picture();
-    let placing = layout::Frame::placing(field, view);
-    let triangles = expand::triangles(field, &placing, resident, &stage.list);
     if stage.list.triangles() <= CAPTURED && stage.captures() {
+        let placing = layout::Frame::placing(field, view);
+        let expanded = [
+            expand::triangles(field, &placing, resident, &stage.list),
+            expand::skirts(field, &placing, resident, &stage.list),
+        ];
         let captured = stage.capture(technique, view)?;
-        pool.captured(captured.len() == triangles.len() && captured.iter().zip(&triangles).all(|(a, b)| a.drawn == *b));
+        let same = |(there, here): (&Vec<AsDrawn>, &Vec<Drawn>)| there.iter().map(|t| t.drawn).eq(here.iter().copied());
+        pool.captured(captured.iter().zip(&expanded).all(same));
     }
-    pool.proof(frame, watertight::prove(field, &view.frustum(), &triangles));
-    drop(triangles);
+    pool.proof(frame, watertight::prove_list(field, view, technique.seams(), resident, &stage.list));
     pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), view.tolerance.px);
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
     let depth = stage.depth();
     pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
     pool.hole_pixels(truth.hole_pixels(view, &picture).len());
+    pool.skirt_pixels(skirts(&picture).into_iter().filter(|&is| is).count());
     pool.picture(frame, &picture, &truth.picture)
 }

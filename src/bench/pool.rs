@@ -35,6 +35,7 @@ pub struct Pool {
     counter_example: Option<String>,
     as_drawn: Option<bool>,
     hole_pixels: u64,
+    skirt_pixels: u64,
     pops: Option<(Histogram, f64, f64)>,
     in_view: u64,
     sub_pixel: f64,
@@ -104,6 +105,11 @@ impl Pool {
     /// Pixels where the sky shines through land.
     pub fn hole_pixels(&mut self, pixels: usize) {
         self.hole_pixels += pixels as u64;
+    }
+
+    /// Pixels that show a skirt.
+    pub fn skirt_pixels(&mut self, pixels: usize) {
+        self.skirt_pixels += pixels as u64;
     }
 
     /// How far the surface jumped at a frame.
@@ -180,8 +186,7 @@ impl Pool {
             counter_example: self.counter_example.clone(),
             as_drawn: self.as_drawn,
             hole_pixels: Some(self.hole_pixels),
-            // No technique of the table draws skirts.
-            skirt_pixels: Some(0),
+            skirt_pixels: Some(self.skirt_pixels),
             economy: self.sizes.as_ref().map(|sizes| Economy {
                 pixels_per_triangle: bins(sizes),
                 hidden_share: self.hidden as f64 / self.shown.max(1) as f64,

@@ -204,7 +204,7 @@ pub struct Errors {
     pub as_drawn: Option<bool>,
     /// Pixels where the sky shines through land, all frames.
     pub hole_pixels: Option<u64>,
-    /// Pixels of skirts, all frames.
+    /// Pixels that show a skirt, all frames.
     pub skirt_pixels: Option<u64>,
     /// What the triangles were spent on.
     pub economy: Option<Economy>,

@@ -68,6 +68,7 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     let mut mesh = MeshBuilder::new(&field);
     let frame = Frame::placing(&field, &view);
     expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));
+    expand::skirts(&field, &frame, technique.resident(), &list).iter().for_each(|t| mesh.add(&t.corners));
     let mesh = mesh.mesh;
     replace(&args.output, |out| write(&mesh, out))
         .map_err(|e| Error::new(args.output.display().to_string(), "file", e))?;

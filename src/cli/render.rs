@@ -19,7 +19,7 @@ use crate::lod::Technique;
 use crate::measure::geometric::{self, Summary};
 use crate::measure::watertight;
 use crate::plan::ScenePlan;
-use crate::scene::holes::Truth;
+use crate::scene::holes::{Truth, skirts};
 use crate::scene::{Scene, Shot};
 use crate::view::{Metric, View};
 
@@ -44,7 +44,7 @@ pub struct RenderArgs {
     /// Draw it so often and report the median times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeat: u32,
-    /// Measure the error of what was drawn, prove it watertight, count hole pixels.
+    /// Measure the error of what was drawn, prove it watertight, count hole and skirt pixels.
     #[arg(long)]
     pub measure: bool,
 }
@@ -80,6 +80,8 @@ struct Measured {
     /// The first few, from the top left corner.
     hole_pixels_at: Vec<[usize; 2]>,
     skirt_pixels: usize,
+    /// Triangles of skirts that are drawn, beside those of the surface.
+    skirt_triangles: usize,
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     counter_example: Option<String>,
@@ -126,7 +128,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_morph(technique.morphs());
+    let plan = plan.with_morph(technique.morphs()).with_seams(technique.seams());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;
@@ -176,19 +178,16 @@ pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
 
 fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -> Result<Measured> {
     let errors = geometric::errors(scene.field, view, technique.resident(), &shot.list);
-    let triangles =
-        expand::triangles(scene.field, &Frame::placing(scene.field, view), technique.resident(), &shot.list);
-    let proof = watertight::prove(scene.field, &view.frustum(), &triangles);
-    drop(triangles);
+    let proof = watertight::prove_list(scene.field, view, technique.seams(), technique.resident(), &shot.list);
     let holes = Truth::new(scene, view)?.hole_pixels(view, &shot.picture);
-    let width = view.size[0] as usize;
+    let (width, frame) = (view.size[0] as usize, Frame::placing(scene.field, view));
     Ok(Measured {
         error_px: errors.screen_px.into(),
         error_m: errors.vertical_m.into(),
         hole_pixels: holes.len(),
         hole_pixels_at: holes.iter().take(8).map(|k| [k % width, k / width]).collect(),
-        // No technique of the table draws skirts.
-        skirt_pixels: 0,
+        skirt_pixels: skirts(&shot.picture).into_iter().filter(|&is| is).count(),
+        skirt_triangles: expand::skirts(scene.field, &frame, technique.resident(), &shot.list).len(),
         watertight: proof.is_ok(),
         counter_example: proof.err().map(|e| e.to_string()),
     })

@@ -1,7 +1,8 @@
 //! From a draw list to its triangles, on the CPU: what the device draws, without a device.
 
 use super::layout::Frame;
-use super::place::{lattice_height, lattice_position, morphed_height, stitched_position, turned_position};
+use super::place::{lattice_position, morphed_height, placed, turned_position};
+use super::skirts::is_skirted;
 use super::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
@@ -37,7 +38,7 @@ pub fn triangles(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawL
     drawn
 }
 
-/// Calls `visit` for every triangle of one draw, or part of a draw, of the list.
+/// Calls `visit` for every triangle of one draw, or part of a draw, of the list that is not degenerate in plan.
 pub fn visit_draw(
     field: &Field,
     frame: &Frame,
@@ -46,14 +47,41 @@ pub fn visit_draw(
     draw: &Draw,
     visit: &mut impl FnMut(&Drawn),
 ) {
+    each_triangle(field, frame, resident, list, draw, |drawn| {
+        if doubled_area(&drawn.corners) != 0 {
+            visit(&drawn);
+        }
+    });
+}
+
+/// The triangles of the list's skirts: upright, no part of the surface. They face away from what they hang from.
+pub fn skirts(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawList) -> Vec<Drawn> {
+    let mut skirts = Vec::new();
+    let is_skirted = |draw: &&Draw| list.instances[draw.instances.start as usize..].first().is_some_and(is_skirted);
+    for draw in list.draws.iter().filter(is_skirted) {
+        each_triangle(field, frame, resident, list, draw, |drawn| skirts.extend(is_upright(&drawn).then_some(drawn)));
+    }
+    skirts
+}
+
+/// Whether a triangle without area in plan has one in space. No surface has such triangles.
+pub fn is_upright(drawn: &Drawn) -> bool {
+    let [a, b, c] = drawn.corners;
+    doubled_area(&drawn.corners) == 0 && a != b && b != c && c != a
+}
+
+fn each_triangle(
+    field: &Field,
+    frame: &Frame,
+    resident: &Geometry,
+    list: &DrawList,
+    draw: &Draw,
+    mut visit: impl FnMut(Drawn),
+) {
     let geometry = geometry(draw.source, resident, list);
     let placed = |instance: u32| &list.instances[instance as usize];
     let corner = |instance, index| corner(field, frame, geometry, draw.source, placed(instance), index);
-    assemble(geometry, draw, corner, |instance, corners| {
-        if doubled_area(&corners) != 0 {
-            visit(&Drawn { corners, instance });
-        }
-    });
+    assemble(geometry, draw, corner, |instance, corners| visit(Drawn { corners, instance }));
 }
 
 /// Calls `visit` for every triangle of one draw: its instance, and its corners as `corner` tells them by instance and
@@ -88,17 +116,23 @@ pub fn geometry<'a>(source: Source, resident: &'a Geometry, list: &'a DrawList) 
     if source == Source::Streamed { &list.streamed } else { resident }
 }
 
-fn corner(field: &Field, frame: &Frame, geometry: &Geometry, source: Source, placed: &Instance, index: u32) -> Corner {
+fn corner(
+    field: &Field,
+    frame: &Frame,
+    geometry: &Geometry,
+    source: Source,
+    instance: &Instance,
+    index: u32,
+) -> Corner {
     match source {
         Source::Lattice => {
-            let turned = turned_position(placed, geometry.lattice[index as usize].position);
-            let turned = stitched_position(placed, turned);
-            let [x, z] = lattice_position(frame, placed, turned);
-            Corner { x, z, y: lattice_height(field, frame, placed, turned) }
+            let placed = placed(field, frame, instance, geometry.lattice[index as usize].position);
+            let [x, z] = placed.at;
+            Corner { x, z, y: placed.height }
         }
         Source::Resident | Source::Streamed => {
             let vertex = &geometry.vertices[index as usize];
-            let [x, z] = lattice_position(frame, placed, turned_position(placed, vertex.position));
+            let [x, z] = lattice_position(frame, instance, turned_position(instance, vertex.position));
             Corner { x, z, y: morphed_height(vertex.height, vertex.target, vertex.morph) }
         }
     }

@@ -4,6 +4,7 @@ pub mod driver;
 pub mod expand;
 pub mod layout;
 pub mod place;
+pub mod skirts;
 pub mod weights;
 
 use std::ops::Range;
@@ -62,6 +63,16 @@ pub enum Upload {
     Vertices(u32, Vec<ExplicitVertex>),
     /// Overwrites resident indices from the given one on.
     Indices(u32, Vec<u32>),
+}
+
+/// How meshes of a technique's lists meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Seams {
+    /// They share whole edges with the same ends: one surface without a gap.
+    #[default]
+    Shared,
+    /// Each has edges of its own, and the skirt that hangs from the higher one reaches down to the lower one.
+    Skirts,
 }
 
 /// How draws reach the device; the triangles are the same.

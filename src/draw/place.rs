@@ -1,7 +1,8 @@
 //! Where lattice vertices lie: the CPU twin of `shaders/position.glsl`, function by function.
 
 use super::layout::{Frame, Instance};
-use super::weights::{FINER, ONE, Slot, get, is_stitched, slot, vertex_level};
+use super::skirts::{self, SKIRT, is_skirted};
+use super::weights::{FINER, ONE, Slot, get, inside, is_stitched, slot, vertex_level};
 use crate::height::{Field, Samples};
 use crate::view::View;
 
@@ -56,6 +57,55 @@ impl Frame {
     }
 }
 
+/// A lattice vertex where it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Lattice position.
+    pub at: [i32; 2],
+    /// Height, metres.
+    pub height: f32,
+    /// Level of detail, with [`SKIRT`] set if it hangs under a side.
+    pub level: u32,
+}
+
+/// Where an instance draws a vertex of its mesh.
+pub fn placed(field: &Field, frame: &Frame, instance: &Instance, position: [i32; 2]) -> Placed {
+    let turned = turned_position(instance, position);
+    if is_skirted(instance) {
+        return hung_vertex(field, frame, instance, turned);
+    }
+    let turned = stitched_position(instance, turned);
+    Placed {
+        at: lattice_position(frame, instance, turned),
+        height: lattice_height(field, frame, instance, turned),
+        level: vertex_level(instance, turned) as u32,
+    }
+}
+
+/// A turned vertex of a mesh with skirts. Its quadrant goes over to the next coarser level by itself.
+fn hung_vertex(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> Placed {
+    let hung = skirts::hung(instance, turned);
+    let level = skirts::quadrant_level(instance, hung.quadrant);
+    let height = quadrant_height(field, frame, instance, hung.at, level, get(instance, inside(hung.quadrant)) & !FINER);
+    let skirt = if hung.side.is_some() { SKIRT } else { 0 };
+    Placed {
+        at: lattice_position(frame, instance, hung.at),
+        height: height - skirts::depth(instance, &hung),
+        level: level as u32 | skirt,
+    }
+}
+
+/// Height of a vertex of a quadrant that has gone to the next coarser level as far as a weight says.
+fn quadrant_height(field: &Field, frame: &Frame, instance: &Instance, at: [i32; 2], level: i32, weight: u32) -> f32 {
+    let sampled = |at: [i32; 2]| sampled_height(field, frame, instance, at);
+    let apart = half_edge(instance, at, level);
+    if weight == 0 || apart == [0, 0] {
+        return sampled(at);
+    }
+    let end = |sign: i32| sampled([0, 1].map(|k| at[k] + sign * apart[k]));
+    morphed_height(sampled(at), midpoint(end(-1), end(1)), unit_weight(weight))
+}
+
 /// A mesh vertex turned as its instance says, in mesh units.
 pub fn turned_position(instance: &Instance, [x, z]: [i32; 2]) -> [i32; 2] {
     let cells = instance.cells as i32;
@@ -104,21 +154,27 @@ pub fn lattice_height(field: &Field, frame: &Frame, instance: &Instance, turned:
     }
     let sampled = sampled_height(field, frame, instance, turned);
     let weight = get(instance, slot) & !FINER;
-    let step = step_at(instance, turned);
-    let mut apart = turned.map(|n| n & step);
+    let apart = half_edge(instance, turned, vertex_level(instance, turned));
     if weight == 0 || apart == [0, 0] {
         return sampled;
     }
-    if apart[0] == apart[1] {
+    let end = |sign: i32| end_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
+    morphed_height(sampled, midpoint(end(-1), end(1)), unit_weight(weight))
+}
+
+/// From a vertex of a level, in mesh units, to one end of the edge of the next coarser level in whose middle it
+/// lies; nothing if that level has the vertex.
+fn half_edge(instance: &Instance, turned: [i32; 2], level: i32) -> [i32; 2] {
+    let step = 1 << (level - instance.shift);
+    let mut apart = turned.map(|n| n & step);
+    if apart == [step; 2] {
         // The diagonal of the coarser cell: it turns with the parity of the cell's place in the whole field.
-        let coarser = vertex_level(instance, turned) + 1;
-        let cell = |k: usize| (instance.origin[k] + scaled(instance, turned[k])) >> coarser;
+        let cell = |k: usize| (instance.origin[k] + scaled(instance, turned[k])) >> (level + 1);
         if (cell(0) + cell(1)) & 1 == 1 {
             apart[1] = -apart[1];
         }
     }
-    let end = |sign: i32| end_height(field, frame, instance, [0, 1].map(|k| turned[k] + sign * apart[k]));
-    morphed_height(sampled, midpoint(end(-1), end(1)), unit_weight(weight))
+    apart
 }
 
 /// Height of the end of a coarser edge: inside the mesh it stays, on a side it may be on its own way.

@@ -56,6 +56,7 @@ impl Constants {
             plan.colour as u32,
             flag(plan.filtered),
             flag(plan.morph),
+            flag(plan.skirts),
         ])
     }
 

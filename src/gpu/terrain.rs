@@ -331,7 +331,12 @@ impl Resident {
 }
 
 /// A device-local buffer with this content.
-pub(super) fn filled(gpu: &Arc<Gpu>, purpose: &'static str, data: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer> {
+pub(super) fn filled(
+    gpu: &Arc<Gpu>,
+    purpose: &'static str,
+    data: &[u8],
+    usage: vk::BufferUsageFlags,
+) -> Result<Buffer> {
     let buffer = Buffer::device(gpu, purpose, data.len() as u64, usage)?;
     if data.is_empty() {
         return Ok(buffer);

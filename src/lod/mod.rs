@@ -9,7 +9,7 @@ pub mod settings;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Submission};
+use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Seams, Submission};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -57,6 +57,11 @@ pub trait Technique: Send {
     /// onto coarser sides.
     fn morphs(&self) -> bool {
         false
+    }
+
+    /// How its meshes meet: which of the two proofs its lists pass ([`watertight`](crate::measure::watertight)).
+    fn seams(&self) -> Seams {
+        Seams::Shared
     }
 
     /// What is worth knowing about the data it prepared: name, value, unit.

@@ -66,6 +66,7 @@ const ERRORS: &[Column] = &[
     ("FLIP", |r| r.errors.as_ref()?.image.map(|i| number(i.flip))),
     ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
     ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
+    ("skirts, px", |r| r.errors.as_ref()?.skirt_pixels.map(|n| n.to_string())),
     ("watertight", |r| r.errors.as_ref()?.watertight.map(|is| if is { "yes" } else { "<b>no</b>" }.to_string())),
 ];
 

@@ -8,7 +8,7 @@ use crate::draw::layout::Captured;
 use crate::draw::{DrawList, Geometry, Submission};
 use crate::gpu::capture::{Capture, Part};
 use crate::gpu::oracle::{self, Oracle, Summary};
-use crate::height::surface::{Corner, Triangle, doubled_area};
+use crate::height::surface::{Corner, doubled_area};
 use crate::lod::Technique;
 use crate::view::View;
 
@@ -27,16 +27,16 @@ impl Stage {
         self.gpu.captures
     }
 
-    /// Every triangle of the last list that is not degenerate in plan, captured on the device for this view.
-    pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<Vec<AsDrawn>> {
-        let mut found = Vec::new();
+    /// Every triangle of the last list's surface, and of its skirts, captured on the device for this view.
+    pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<[Vec<AsDrawn>; 2]> {
+        let mut found = [Vec::new(), Vec::new()];
         let resident = technique.resident();
         self.each_batch(resident, view, |_, batch, list, records| {
             for part in batch {
                 let geometry = expand::geometry(part.draw.source, resident, list);
                 triangles(geometry, part, records, |drawn, corners| {
                     let relative = corners.map(|k| records[k as usize].relative);
-                    found.push(AsDrawn { drawn, relative });
+                    found[usize::from(expand::is_upright(&drawn))].push(AsDrawn { drawn, relative });
                 });
             }
             Ok(())
@@ -58,8 +58,10 @@ impl Stage {
             let mut facing_up = Vec::new();
             for part in batch {
                 let geometry = expand::geometry(part.draw.source, resident, list);
-                triangles(geometry, part, records, |drawn, [a, b, c]| {
-                    facing_up.push(if doubled_area(&drawn.corners) > 0 { [a, b, c] } else { [a, c, b] });
+                triangles(geometry, part, records, |drawn, [a, b, c]| match doubled_area(&drawn.corners) {
+                    // Skirts are no part of the surface.
+                    0 => {}
+                    area => facing_up.push(if area > 0 { [a, b, c] } else { [a, c, b] }),
                 });
             }
             let frame = stage.look.frame(&stage.field, view, stage.range);
@@ -111,7 +113,7 @@ impl Stage {
     }
 }
 
-/// Calls `visit` for every triangle of a part that is not degenerate, with the records of its corners.
+/// Calls `visit` for every triangle of a part, of its surface or of its skirts, with the records of its corners.
 fn triangles(geometry: &Geometry, part: &Part, records: &[Captured], mut visit: impl FnMut(Drawn, [u32; 3])) {
     let corner = |instance: u32, index: u32| {
         let k = part.record(instance, index);
@@ -119,9 +121,9 @@ fn triangles(geometry: &Geometry, part: &Part, records: &[Captured], mut visit: 
         (Corner { x, z, y: height }, k as u32)
     };
     expand::assemble(geometry, &part.draw, corner, |instance, corners: [(Corner, u32); 3]| {
-        let triangle: Triangle = corners.map(|(corner, _)| corner);
-        if doubled_area(&triangle) != 0 {
-            visit(Drawn { corners: triangle, instance }, corners.map(|(_, k)| k));
+        let drawn = Drawn { corners: corners.map(|(corner, _)| corner), instance };
+        if doubled_area(&drawn.corners) != 0 || expand::is_upright(&drawn) {
+            visit(drawn, corners.map(|(_, k)| k));
         }
     });
 }

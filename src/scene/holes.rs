@@ -1,4 +1,4 @@
-//! Pixels where the sky shines through land.
+//! Pixels where the sky shines through land, and pixels of skirts.
 
 use std::sync::Arc;
 
@@ -51,6 +51,11 @@ fn missing_land(scene: &Scene, view: &View) -> Result<Vec<bool>> {
         pixel.into_iter().for_each(|k| mask[k] = true);
     }
     Ok(mask)
+}
+
+/// Where a skirt is seen, pixel by pixel: there alpha is half.
+pub fn skirts(picture: &image::RgbaImage) -> Vec<bool> {
+    picture.pixels().map(|p| (1..255).contains(&p.0[3])).collect()
 }
 
 /// Where land was drawn, pixel by pixel.

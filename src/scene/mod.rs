@@ -70,7 +70,7 @@ pub struct Times {
 
 /// One picture and how it came about.
 pub struct Shot {
-    /// Colours; alpha says where land was drawn.
+    /// Colours; alpha says where land was drawn, half of it where a skirt was.
     pub picture: image::RgbaImage,
     /// What was drawn.
     pub list: DrawList,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
+use cuesta::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Seams, Source, Topology, skirts};
 use cuesta::height::Field;
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
 use cuesta::lod::{self, Settings, Technique};
@@ -26,6 +26,11 @@ const BREAKERS: &[Breaker] = &[
     ("one surface", "a triangle dropped", "Gap", "real mountains", |field| streamed(field, drop_a_triangle)),
     ("one surface", "a vertex one ulp off", "Crack", "tiled", |field| streamed(field, nudge_a_vertex)),
     ("one surface", "too narrow a frustum", "Gap", "131 × 67", |field| in_another_view(field, narrower)),
+    ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| each_depth(list, 0.5))),
+    ("one surface", "a side without its skirt", "Seam", "131 × 67", |field| skirted(field, drop_a_skirt)),
+    ("one surface", "skirts where none are said to be", "TJunction", "131 × 67", |field| {
+        Box::new(Changed { seams: Seams::Shared, inner: clusters(field), change: |_| () })
+    }),
     ("everything in sight is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
         changed(field, drop_a_block)
     }),
@@ -81,7 +86,8 @@ fn every_law_fails_on_what_breaks_it() {
 fn unbroken_it_keeps_the_laws() {
     let fields = cases::fields();
     let (_, field) = fields.iter().find(|(name, _)| *name == "131 × 67").expect("a field of the list");
-    let whole: [Box<dyn Technique>; 4] = [
+    let whole: [Box<dyn Technique>; 5] = [
+        skirted(field, |_| ()),
         changed(field, |_| ()),
         streamed(field, |_| ()),
         in_another_view(field, |view, _| *view),
@@ -89,7 +95,9 @@ fn unbroken_it_keeps_the_laws() {
     ];
     for mut technique in whole {
         let mut subject = Subject { field, technique: &mut *technique, views: &cases::views(field) };
-        for law in LAWS {
+        // Clusters have blocks of several levels.
+        let has_levels = subject.technique.seams() == Seams::Shared;
+        for law in LAWS.iter().filter(|law| has_levels || law.name != "neighbours within one level") {
             (law.check)(&mut subject).unwrap_or_else(|why| panic!("{}: {why}", law.name));
         }
     }
@@ -103,12 +111,37 @@ fn geomipmap(field: &Arc<Field>) -> Box<dyn Technique> {
 
 /// Geomipmap with its lists changed.
 struct Changed {
+    seams: Seams,
     inner: Box<dyn Technique>,
     change: fn(&mut DrawList),
 }
 
 fn changed(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
-    Box::new(Changed { inner: geomipmap(field), change })
+    Box::new(Changed { seams: Seams::Shared, inner: geomipmap(field), change })
+}
+
+/// Clusters with skirts.
+fn clusters(field: &Arc<Field>) -> Box<dyn Technique> {
+    let entry = lod::find("clusters").expect("a row of the table");
+    let choices = [("block", "8"), ("seams", "skirts"), ("morph", "on")].map(|(key, word)| (key.into(), word.into()));
+    (entry.build)(Arc::clone(field), &Settings::new(entry, None, &choices).expect("the table's own values"))
+}
+
+fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
+    Box::new(Changed { seams: Seams::Skirts, inner: clusters(field), change })
+}
+
+fn each_depth(list: &mut DrawList, factor: f32) {
+    for instance in &mut list.instances {
+        let [_, sides, depth, _] = instance.weights;
+        skirts::set(&mut instance.weights, sides, factor * f32::from_bits(depth));
+    }
+}
+
+/// The first skirt of each list: its bit.
+fn drop_a_skirt(list: &mut DrawList) {
+    let skirted = list.instances.iter_mut().find(|instance| instance.weights[1] != 0);
+    skirted.into_iter().for_each(|instance| instance.weights[1] &= instance.weights[1] - 1);
 }
 
 impl Technique for Changed {
@@ -121,6 +154,9 @@ impl Technique for Changed {
     fn select(&mut self, view: &View, list: &mut DrawList) {
         self.inner.select(view, list);
         (self.change)(list);
+    }
+    fn seams(&self) -> Seams {
+        self.seams
     }
     fn keeps_tolerance(&self) -> bool {
         true

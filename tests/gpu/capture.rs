@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
 use cuesta::draw::place::relative_position;
+use cuesta::draw::{Seams, expand};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -19,7 +19,10 @@ use super::{as_f32, aslant, difference, mountains, on_device, technique};
 
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Stage {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
+        .unwrap()
+        .with_morph(technique.morphs())
+        .with_seams(technique.seams());
     let mut stage = Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, view.size).unwrap();
     stage.draw(technique, view, Copy::PictureAndDepth).unwrap();
     stage
@@ -30,10 +33,11 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn T
     let mut stage = stage(gpu, field, technique, &view);
     let captured = stage.capture(technique, &view).unwrap();
     let frame = Frame::placing(field, &view);
-    let expanded = expand::triangles(field, &frame, technique.resident(), &stage.list);
-    assert_eq!(captured.len(), expanded.len(), "{name}");
+    let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &stage.list));
+    assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
+    assert_eq!(expanded[1].is_empty(), technique.seams() == Seams::Shared, "{name}");
     let bits = |t: &expand::Drawn| (t.instance, t.corners.map(|c| (c.x, c.z, c.y.to_bits())));
-    for (there, here) in captured.iter().zip(&expanded) {
+    for (there, here) in captured.iter().flatten().zip(expanded.iter().flatten()) {
         assert_eq!(bits(&there.drawn), bits(here), "{name}: {there:?} {here:?}");
         let relative = here.corners.map(|c| relative_position(&frame, [c.x, c.z], c.y).map(f32::to_bits));
         assert_eq!(there.relative.map(|corner| corner.map(f32::to_bits)), relative, "{name}: {there:?}");
@@ -52,6 +56,9 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8"]),
                 ("clusters", &["block=8", "morph=on"]),
                 ("clusters:draw-per-block", &["block=16", "morph=on"]),
+                ("clusters", &["block=8", "seams=skirts"]),
+                ("clusters", &["block=8", "seams=skirts", "morph=on"]),
+                ("clusters:draw-per-block", &["block=8", "seams=skirts", "morph=on"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());

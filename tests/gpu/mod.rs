@@ -8,6 +8,7 @@ mod golden;
 mod layout;
 mod neck;
 mod plan;
+mod skirts;
 mod twin;
 
 use std::sync::Arc;
@@ -61,7 +62,10 @@ fn shoot_planned(
 
 /// The picture of a field with the default look.
 fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Shot {
-    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
+        .unwrap()
+        .with_morph(technique.morphs())
+        .with_seams(technique.seams());
     shoot_planned(gpu, field, &plan, technique, view)
 }
 

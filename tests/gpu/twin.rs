@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame};
-use cuesta::draw::place::{
-    lattice_height, lattice_position, morphed_height, relative_position, stitched_position, turned_position,
-};
-use cuesta::draw::{DrawList, Instance};
+use cuesta::draw::place::{lattice_position, morphed_height, placed, relative_position, turned_position};
+use cuesta::draw::skirts::{self, is_skirted};
+use cuesta::draw::{DrawList, Instance, Seams};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
 use cuesta::height::Field;
@@ -25,7 +24,11 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
         // Any bytes are weights; quadrants of level 0 cannot be finer than it.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
-        let weights = [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
+        let mut weights =
+            [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
+        if is_skirted(instance) {
+            skirts::set(&mut weights, random(1), 1.0 + f32::from(k) / 7.0);
+        }
         let morphing = Instance { weights, ..*instance };
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
@@ -42,6 +45,7 @@ fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
     // Without weights the program does not know of half samples.
     if morph {
         queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on"], morph));
+        queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on", "seams=skirts"], morph));
     }
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
@@ -59,12 +63,12 @@ fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
 
 fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
     let vertex = &query.vertex;
+    if query.explicit_height == 0 {
+        let placed = placed(field, frame, &query.instance, vertex.position);
+        return relative_position(frame, placed.at, placed.height);
+    }
+    let height = morphed_height(vertex.height, vertex.target, vertex.morph);
     let turned = turned_position(&query.instance, vertex.position);
-    let turned = if query.explicit_height == 0 { stitched_position(&query.instance, turned) } else { turned };
-    let height = match query.explicit_height {
-        0 => lattice_height(field, frame, &query.instance, turned),
-        _ => morphed_height(vertex.height, vertex.target, vertex.morph),
-    };
     relative_position(frame, lattice_position(frame, &query.instance, turned), height)
 }
 
@@ -77,7 +81,10 @@ fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
 fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: bool) {
     let view = aslant(field, [320, 200], 2.0);
     let frame = Frame::placing(field, &view);
-    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_morph(morph);
+    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
+        .unwrap()
+        .with_morph(morph)
+        .with_seams(Seams::Skirts);
     plan.page_shift = page_shift;
     let queries = queries(field, &view, morph);
     let device = twin::positions(gpu, &plan, field, &frame, &queries).unwrap();

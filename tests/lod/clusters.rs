@@ -6,13 +6,13 @@ use std::sync::Arc;
 use cuesta::bench::paths;
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, Instance, Source, Submission, Topology, weights};
+use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology, weights};
 use cuesta::height::bounds::{Bounds, Measure};
 use cuesta::height::synth::{Kind, synth};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::Technique;
 use cuesta::lod::clusters::mesh::Mesh;
-use cuesta::measure::geometric;
+use cuesta::measure::{geometric, watertight};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::{heights, technique};
@@ -78,9 +78,10 @@ fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Corn
 fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance() {
     let mut seed = 11;
     let (mut blocks, mut clusters, mut kinds, mut closest) = (0, 0, BTreeSet::new(), 0.0f64);
-    for k in 0..50 {
+    for k in 0..60 {
         let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129], [17, 17]][k % 5]);
-        let settings = ["block=8", ["morph=off", "morph=on"][k / 2 % 2]];
+        let seams = if k < 50 { "seams=stitched" } else { "seams=skirts" };
+        let settings = ["block=8", ["morph=off", "morph=on"][k / 2 % 2], seams];
         let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
             .map(|m| technique(&field, m, &settings));
         for _ in 0..20 {
@@ -93,7 +94,13 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
                 [Submission::Indirect, Submission::Direct, Submission::Direct]
             });
             assert!(list.draws.len() <= 23 && list.commands() <= 1 && each.draws.len() == list.instances.len());
-            kinds.extend(list.draws.iter().map(|draw| draw.indices.start));
+            if seams == "seams=stitched" {
+                kinds.extend(list.draws.iter().map(|draw| draw.indices.start));
+            }
+            for (mode, list) in modes.iter().zip([&list, &each, &single]) {
+                let proof = watertight::prove_list(&field, &view, mode.seams(), mode.resident(), list);
+                proof.unwrap_or_else(|why| panic!("{settings:?}: {why}"));
+            }
             let errors = geometric::errors(&field, &view, modes[0].resident(), &list);
             let share = errors.screen_px.max / view.tolerance.px;
             assert!(share <= 1.0 + 1e-9, "{share} of the tolerance, {settings:?}, at {:?}", errors.screen_at);
@@ -140,7 +147,7 @@ fn rough_spots(seed: &mut u64) -> Field {
 #[test]
 fn no_weights_exceed_the_error() {
     let (mut seed, mut closest) = (5, [0.0f64; 4]);
-    let mesh = Mesh::new(16, &[[1, 0, 0, 0]]);
+    let mesh = Mesh::new(16, &[[1, 0, 0, 0]], Seams::Shared);
     for _ in 0..20 {
         let field = rough_spots(&mut seed);
         let view = anywhere(&field, &mut seed);

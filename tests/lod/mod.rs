@@ -2,6 +2,7 @@
 
 mod clusters;
 mod morph;
+mod skirts;
 
 use std::sync::Arc;
 
@@ -21,12 +22,16 @@ fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Techn
     (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).expect("the table's own values"))
 }
 
-/// The drawn height above every sample; not a number where nothing is drawn.
+/// The drawn height above every sample, the higher one where one edge lies above another; not a number where nothing is
+/// drawn.
 fn heights(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Vec<f64> {
     let [w, h] = field.size();
     let mut heights = vec![f64::NAN; (w * h) as usize];
     expand::visit_triangles(field, &Frame::placing(field, view), resident, list, |drawn| {
-        surface::visit_samples(&drawn.corners, |x, z, y| heights[(z * w + x) as usize] = y);
+        surface::visit_samples(&drawn.corners, |x, z, y| {
+            let height = &mut heights[(z * w + x) as usize];
+            *height = height.max(y);
+        });
     });
     heights
 }

@@ -116,9 +116,11 @@ fn on_a_slow_way_nothing_jumps() {
 #[test]
 fn clusters_do_not_jump_either() {
     let field = land();
-    for block in ["block=8", "block=16"] {
-        let [off, on] = ["morph=off", "morph=on"].map(|morph| largest_jump(&field, "clusters", &[block, morph]));
-        println!("clusters, {block}: {off:.3} px at once, {on:.3} px morphing");
-        assert!(on < JUMP_PX && JUMP_PX < off, "{block}: {on} px morphing, {off} px at once");
+    for (block, seams) in [("block=8", "stitched"), ("block=16", "stitched"), ("block=8", "skirts")] {
+        let seams = format!("seams={seams}");
+        let [off, on] =
+            ["morph=off", "morph=on"].map(|morph| largest_jump(&field, "clusters", &[block, morph, &seams]));
+        println!("clusters, {block} {seams}: {off:.3} px at once, {on:.3} px morphing");
+        assert!(on < JUMP_PX && JUMP_PX < off, "{block} {seams}: {on} px morphing, {off} px at once");
     }
 }

@@ -2,10 +2,11 @@
 
 use super::refine::{Found, Refinement, Split};
 use super::sight::Sight;
+use super::skirts::Skirts;
 use super::states::{Seeds, State};
 use super::tree::{Node, SIDES};
-use crate::draw::Instance;
 use crate::draw::weights::{self, FINER, ONE, STITCHED};
+use crate::draw::{self, Instance};
 
 /// What a quadrant of a cluster holds.
 const NOTHING: u8 = 0;
@@ -27,6 +28,8 @@ pub struct Collapse<'a> {
     pub cells: u32,
     /// Whether each block is an instance of its own.
     pub single: bool,
+    /// The skirts, if blocks have them.
+    pub skirts: Option<Skirts<'a>>,
 }
 
 impl Collapse<'_> {
@@ -66,14 +69,22 @@ impl Collapse<'_> {
         }
         let (seed, turns) = self.seeds.of(state);
         let level = node.level - 1;
-        let instance =
-            Instance { turns, cells: 4 * self.cells, weights: self.weights(node, state), ..self.placed(node, level) };
+        let instance = match &self.skirts {
+            Some(skirts) => Instance { turns, ..self.skirted(skirts, node, level, blocks(node, state)) },
+            None => {
+                let weights = self.weights(node, state);
+                Instance { turns, cells: 4 * self.cells, weights, ..self.placed(node, level) }
+            }
+        };
         drawn.push((seed as u32, instance));
     }
 
     /// A block by itself: the first quadrant of a cluster, as if the cluster ended with it.
     fn block(&self, node: Node) -> Instance {
         let parent = node.parent();
+        if let Some(skirts) = &self.skirts {
+            return self.skirted(skirts, node, node.level, std::iter::once((0, node)));
+        }
         let weight = |node| self.refinement.weight(self.sight, node).unwrap_or(0);
         let inside = if node == self.sight.tree.root() { 0 } else { weight(parent) };
         let side = |side: usize| {
@@ -83,6 +94,13 @@ impl Collapse<'_> {
         };
         let weights = weights::uniform(inside, SIDES.map(side));
         Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
+    }
+
+    /// Blocks at a node, each in a quadrant, with their skirts. Quadrants have weights of their own alone: one of blocks
+    /// of weight v is the paper's α = ½ (1 − v), and α = ½ + ½ (1 − v) if there are four in it.
+    fn skirted(&self, skirts: &Skirts, node: Node, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> Instance {
+        let cells = draw::skirts::cells(2 * self.cells);
+        Instance { cells, weights: skirts.weights(level, blocks), ..self.placed(node, level) }
     }
 
     /// An instance at a node's first vertex, two mesh units a cell of a level.
@@ -121,6 +139,15 @@ impl Collapse<'_> {
         };
         if weight < ONE { weight } else { STITCHED }
     }
+}
+
+/// The blocks of a state in a node, each with its quadrant.
+fn blocks(node: Node, state: State) -> impl Iterator<Item = (u32, Node)> {
+    (0..4).flat_map(move |quadrant| {
+        let (child, what) = (node.child(quadrant), state[quadrant as usize]);
+        let count = [0, 1, 4][usize::from(what)];
+        (0..count).map(move |k| (quadrant, if what == BLOCK { child } else { child.child(k) }))
+    })
 }
 
 /// The halves of outer sides that a quadrant has: slot and side.

@@ -3,30 +3,41 @@
 use std::ops::Range;
 
 use super::states::State;
-use crate::draw::{Geometry, LatticeVertex};
+use crate::draw::{Geometry, LatticeVertex, Seams, skirts};
 use crate::height::rtin;
 
 /// The grid with its index ranges.
 pub struct Mesh {
-    /// (4n + 1)² vertices, two units a cell of a quadrant that is one block.
+    /// (4n + 1)² vertices, with skirts (4n + 6)²: two units a cell of a quadrant that is one block.
     pub geometry: Geometry,
     /// By seed.
     pub ranges: Vec<Range<u32>>,
 }
 
 impl Mesh {
-    /// Clusters of blocks of `n` × `n` cells in these states.
-    pub fn new(n: i32, states: &[State]) -> Self {
-        let units = 4 * n;
-        let positions = (0..=units).flat_map(|z| (0..=units).map(move |x| [x, z]));
+    /// Clusters of blocks of `n` × `n` cells in these states; with skirts each quadrant has lines of its own.
+    pub fn new(n: i32, states: &[State], seams: Seams) -> Self {
+        let last = match seams {
+            Seams::Shared => 4 * n,
+            Seams::Skirts => skirts::cells(2 * n as u32) as i32,
+        };
+        let positions = (0..=last).flat_map(|z| (0..=last).map(move |x| [x, z]));
         let lattice = positions.map(|position| LatticeVertex { position }).collect();
-        let index = |[x, z]: [i32; 2]| (z * (units + 1) + x) as u32;
         let mut indices: Vec<u32> = Vec::new();
         let mut append = |state: &State| {
             let first = indices.len() as u32;
-            let quadrants =
-                state.iter().enumerate().flat_map(|(quadrant, &what)| quadrant_triangles(n, quadrant, what));
-            indices.extend(quadrants.flatten().map(index));
+            for (quadrant, &what) in state.iter().enumerate() {
+                let half = [quadrant & 1, quadrant >> 1].map(|half| half as i32);
+                let line = |k: usize, place: i32| match seams {
+                    Seams::Shared => half[k] * 2 * n + place,
+                    Seams::Skirts => skirts::line(2 * n, half[k], place),
+                };
+                let index = |[x, z]: [i32; 2]| (line(1, z) * (last + 1) + line(0, x)) as u32;
+                indices.extend(quadrant_triangles(n, what).flatten().map(index));
+                if seams == Seams::Skirts {
+                    indices.extend(skirt_triangles(n, what).flatten().map(index));
+                }
+            }
             first..indices.len() as u32
         };
         let ranges = states.iter().map(&mut append).collect();
@@ -34,15 +45,36 @@ impl Mesh {
     }
 }
 
+/// Cells along a quadrant's side, and units of a cell.
+fn cells_of(n: i32, what: u8) -> (i32, i32) {
+    [(0, 0), (n, 2), (2 * n, 1)][usize::from(what)]
+}
+
 /// The triangles of a quadrant; each begins with a vertex inside it, which alone tells the level of the whole.
-fn quadrant_triangles(n: i32, quadrant: usize, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
-    let (cells, step) = [(0, 0), (n, 2), (2 * n, 1)][usize::from(what)];
-    let first = [quadrant & 1, quadrant >> 1].map(|half| half as i32 * 2 * n);
+fn quadrant_triangles(n: i32, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
+    let (cells, step) = cells_of(n, what);
     let grid = (0..cells).flat_map(move |j| (0..cells).map(move |i| (i, j)));
     grid.flat_map(|(i, j)| rtin::cell(i, j)).map(move |triangle| {
         let inside = |[x, z]: &[i32; 2]| x % cells != 0 && z % cells != 0;
         let mut corners = triangle;
         corners.rotate_left(triangle.iter().position(inside).unwrap_or(0));
-        corners.map(|[x, z]| [first[0] + step * x, first[1] + step * z])
+        corners.map(|[x, z]| [step * x, step * z])
+    })
+}
+
+/// The triangles of the skirts along a quadrant's sides, facing away from it; each begins with a skirt's vertex.
+fn skirt_triangles(n: i32, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
+    let (cells, step) = cells_of(n, what);
+    let last = 2 * n;
+    // Around the quadrant with the land on the left, seen from above: along a side, and beyond it.
+    let sides = (0..4).flat_map(move |side| (0..cells).map(move |k| (side, step * k, step * (k + 1))));
+    sides.flat_map(move |(side, from, to)| {
+        let at = |along: i32, beyond: i32| match side {
+            0 => [-beyond, along],
+            1 => [along, last + beyond],
+            2 => [last + beyond, last - along],
+            _ => [last - along, -beyond],
+        };
+        [[at(from, 1), at(to, 0), at(from, 0)], [at(from, 1), at(to, 1), at(to, 0)]]
     })
 }

@@ -11,19 +11,22 @@
 //!   `draw-per-cluster`; its baseline is `draw-per-block`: the same triangles, a draw a block;
 //! - with the metric `certified` the error is a bound, which eq. 1 is not off the view axis;
 //! - neighbours are within one level of each other, and a side that meets a coarser block falls onto its edge: no
-//!   skirts are needed;
+//!   skirts are needed. With `seams=skirts` it is as published, and only the skirts' depth is not: it follows from
+//!   the errors of both sides and is 0 where nothing differs;
 //! - with `morph=on` the blocks in a node go over into it as eq. 3 and 4 have it, with a weight for each quadrant:
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
-//!   of their own, those of the coarser of their two blocks, so that both agree on them;
+//!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
-//! Laws kept: watertight, covered once, error within tolerance (`error=measured`), no state between views.
+//! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
+//! (`error=measured`), no state between views.
 
 mod collapse;
 mod driver;
 pub mod mesh;
 mod refine;
 mod sight;
+mod skirts;
 pub mod states;
 mod tree;
 
@@ -33,10 +36,11 @@ use self::collapse::Collapse;
 use self::mesh::Mesh;
 use self::refine::Refinement;
 use self::sight::Sight;
+use self::skirts::Skirts;
 use self::states::Seeds;
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Source, Submission, Topology};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Seams, Source, Submission, Topology};
 use crate::height::Field;
 use crate::height::bounds::Measure;
 use crate::view::View;
@@ -77,6 +81,12 @@ pub const ENTRY: Entry = Entry {
             default: "off",
             about: "whether blocks go over into their parent, or change at once",
         },
+        Setting {
+            key: "seams",
+            values: Values::Words(&["stitched", "skirts"]),
+            default: "stitched",
+            about: "where blocks meet: on common edges, or with skirts under edges of their own, as published",
+        },
     ],
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };
@@ -102,6 +112,7 @@ struct Clusters {
     cells: u32,
     morph: bool,
     band_end: f32,
+    seams: Seams,
     measured: bool,
     /// Seed and instance of what is drawn.
     drawn: Vec<(u32, Instance)>,
@@ -111,6 +122,7 @@ impl Clusters {
     fn new(field: &Arc<Field>, settings: &Settings) -> Self {
         let cells = settings.number("block") as u32;
         let morph = settings.word("morph") == "on";
+        let seams = if settings.word("seams") == "skirts" { Seams::Skirts } else { Seams::Shared };
         let measured = settings.word("error") == "measured";
         let mode = match settings.variant() {
             Some("draw-per-block") => Mode::DrawPerBlock,
@@ -123,7 +135,7 @@ impl Clusters {
         let growth = if morph { band_end * 1.001 } else { 1.0 };
         let tree = Tree::new(field, Measure { cells, growth, errors: measured, morph }, !measured);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
-        let mesh = Mesh::new(cells as i32, &seeds.states);
+        let mesh = Mesh::new(cells as i32, &seeds.states, seams);
         // A quadtree has at most three leaves more for each split node.
         let most_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MOST_BLOCKS / 3);
         let most_drawn = match mode {
@@ -131,9 +143,10 @@ impl Clusters {
             // A split node draws at most one, and a lone root is one too.
             _ => most_splits.max(1),
         };
-        let driver = (mode == Mode::GpuDriven).then(|| driver::driver(&tree, cells, &seeds, &mesh, most_splits)).flatten();
-        let refinement = Refinement::new(most_splits);
-        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, band_end, measured, drawn: Vec::new() }
+        let is_driven = mode == Mode::GpuDriven && seams == Seams::Shared;
+        let driver = is_driven.then(|| driver::driver(&tree, cells, &seeds, &mesh, most_splits)).flatten();
+        let (refinement, drawn) = (Refinement::new(most_splits), Vec::new());
+        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, band_end, seams, measured, drawn }
     }
 
     fn sight(&self, view: &View) -> Sight<'_> {
@@ -149,7 +162,8 @@ impl Clusters {
             let sight = Sight::new(&self.tree, &wider, self.band_end, !self.morph);
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-                Collapse { sight: &sight, refinement, seeds, cells: self.cells, single }.run(&mut drawn);
+                let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement, view));
+                Collapse { sight: &sight, refinement, seeds, cells: self.cells, single, skirts }.run(&mut drawn);
                 break;
             }
             wider.tolerance.px = 1.5 * wider.tolerance.px.max(f64::MIN_POSITIVE);
@@ -225,6 +239,10 @@ impl Technique for Clusters {
     fn morphs(&self) -> bool {
         // Without morphing too: sides that meet a coarser block fall onto its edge.
         true
+    }
+
+    fn seams(&self) -> Seams {
+        self.seams
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -194,12 +194,15 @@ fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
     match containment {
         Containment::Outside => false,
         Containment::Inside => true,
-        Containment::Crossing => node.level == 0 || (0..4).any(|quadrant| {
-            let child = node.child(quadrant);
-            sight.tree.square(child).is_some_and(|square| {
-                is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
-            })
-        }),
+        Containment::Crossing => {
+            node.level == 0
+                || (0..4).any(|quadrant| {
+                    let child = node.child(quadrant);
+                    sight.tree.square(child).is_some_and(|square| {
+                        is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
+                    })
+                })
+        }
     }
 }
 

@@ -89,9 +89,7 @@ impl<'a> Sight<'a> {
     pub fn containment(&self, extent: &Extent) -> Containment {
         let view = &self.view;
         let mut containment = Containment::Inside;
-        for [x, y, z, w] in
-            [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane]
-        {
+        for [x, y, z, w] in [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane] {
             let [least, most, size] = along([x, y, z], extent);
             let slack = SLACK * (size + w.abs());
             if (most + w) + slack < 0.0 {

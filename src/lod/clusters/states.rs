@@ -70,6 +70,7 @@ impl Seeds {
 mod tests {
     use super::super::mesh::Mesh;
     use super::*;
+    use crate::draw::Seams;
     use std::collections::BTreeSet;
 
     #[test]
@@ -93,7 +94,7 @@ mod tests {
     fn turned_seeds_draw_exactly_the_quadrants_asked_for() {
         let n = 8;
         let seeds = Seeds::new(false);
-        let mesh = Mesh::new(n, &seeds.states);
+        let mesh = Mesh::new(n, &seeds.states, Seams::Shared);
         let set = |mesh: &Mesh, seed: usize, turns: u32| -> BTreeSet<[[i32; 2]; 3]> {
             let range = &mesh.ranges[seed];
             let indices = &mesh.geometry.indices[range.start as usize..range.end as usize];
@@ -109,7 +110,7 @@ mod tests {
         };
         for number in 1..81 {
             let (seed, turns) = seeds.of(state(number));
-            let own = Mesh::new(n, &[state(number)]);
+            let own = Mesh::new(n, &[state(number)], Seams::Shared);
             let drawn = set(&mesh, seed, turns);
             assert_eq!(drawn, set(&own, 0, 0), "{:?}", state(number));
             for (quadrant, &what) in state(number).iter().enumerate() {

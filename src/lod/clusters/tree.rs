@@ -124,6 +124,19 @@ impl Tree {
         square.has_land().then(|| Square { error: self.error(node.level, square.error), ..square })
     }
 
+    /// The most, metres, by which a node's surface is off the samples, whatever its error is taken for, and the
+    /// most by which two samples in it differ.
+    pub fn deviation(&self, node: Node) -> [f32; 2] {
+        let Square { error, range: [low, high] } = self.bounds.square(node.level, node.at);
+        let apart = (high - low).next_up();
+        [if self.errors == Errors::Measured { error } else { apart }, apart]
+    }
+
+    /// Length of the longer side of a cell, metres.
+    pub fn cell_m(&self, level: u32) -> f64 {
+        self.spacing[0].max(self.spacing[1]) * f64::from(1u32 << level)
+    }
+
     /// The error of a square of a level in which `measured` was measured.
     pub fn error(&self, level: u32, measured: f32) -> f32 {
         match self.errors {

@@ -46,6 +46,12 @@ impl Edge {
     fn triangle(self) -> u32 {
         self.0 as u32 & (u32::MAX >> 1)
     }
+
+    fn border(self) -> BorderEdge {
+        let [low, high] = self.ends();
+        let (from, to) = if self.is_backward() { (high, low) } else { (low, high) };
+        BorderEdge { from, to, triangle: self.triangle() }
+    }
 }
 
 /// A lattice position in 48 bits.
@@ -58,19 +64,23 @@ pub fn unpacked(bits: u64) -> [i32; 2] {
     [24, 0].map(|shift| (bits >> shift & 0xff_ffff) as i32)
 }
 
-/// The edges without a partner. Refuted if a directed edge occurs twice.
-pub fn border(triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
+/// The edges without a partner, and pairs that are not `joined`: by the triangles of both, and the edge's ends.
+/// Refuted if a directed edge occurs twice.
+pub fn border(
+    triangles: &[Drawn],
+    joined: impl Fn([u32; 2], [[i32; 2]; 2]) -> bool,
+) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
     let mut edges: Vec<Edge> = (0u32..).zip(triangles).flat_map(|(k, t)| edges_of(k, t)).collect();
     edges.par_sort_unstable();
     let mut border = Vec::new();
     for uses in edges.chunk_by(Edge::same_ends) {
         match uses {
-            [only] => {
-                let [low, high] = only.ends();
-                let (from, to) = if only.is_backward() { (high, low) } else { (low, high) };
-                border.push(BorderEdge { from, to, triangle: only.triangle() });
+            [only] => border.push(only.border()),
+            [forth, back] if forth.is_backward() != back.is_backward() => {
+                if !joined([forth.triangle(), back.triangle()], forth.ends()) {
+                    border.extend([forth.border(), back.border()]);
+                }
             }
-            [forth, back] if forth.is_backward() != back.is_backward() => {}
             _ => {
                 let twice = if uses[0].is_backward() == uses[1].is_backward() { &uses[..2] } else { &uses[1..3] };
                 let text = format!("edge {:?} used {} times", uses[0].ends(), uses.len());
@@ -103,6 +113,6 @@ pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), B
     Ok(())
 }
 
-fn gcd(a: u32, b: u32) -> u32 {
+pub fn gcd(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { gcd(b, a % b) }
 }

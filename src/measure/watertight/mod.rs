@@ -17,9 +17,12 @@
 //!
 //! What lies along a culled region or a hole is thus no matter of the border's shape but of what is missing
 //! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
+//!
+//! Surfaces with skirts have gaps between edges, which [`prove_with_skirts`] finds and shows hidden instead of 2 to 4.
 
 mod edges;
 pub mod plan;
+mod seams;
 mod sweep;
 
 use std::io::{self, Write};
@@ -27,10 +30,12 @@ use std::io::{self, Write};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::draw::expand::Drawn;
+use crate::draw::expand::{self, Drawn};
+use crate::draw::layout::Frame;
+use crate::draw::{DrawList, Geometry, Seams};
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
-use crate::view::Frustum;
+use crate::view::{Frustum, View};
 
 /// What is wrong with a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -47,6 +52,8 @@ pub enum Kind {
     TJunction,
     /// Land with data, perhaps in sight, is not covered.
     Gap,
+    /// One edge lies above another, and no skirt hides what is between them.
+    Seam,
 }
 
 /// The fewest triangles that show what is wrong.
@@ -78,7 +85,7 @@ pub struct Proof {
     pub triangles: usize,
     /// Twice the land covered, in samples².
     pub doubled_area: i64,
-    /// Edges with a triangle on one side only.
+    /// Edges with a triangle on one side only; with skirts, their parts from sample to sample.
     pub border_edges: usize,
 }
 
@@ -92,12 +99,56 @@ pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Pr
     on_the_field(field, triangles)?;
     faces_up(triangles)?;
     one_height_a_vertex(triangles)?;
-    let border = edges::border(triangles)?;
+    let border = edges::border(triangles, |_, _| true)?;
     edges::no_t_junction(triangles, &border)?;
     let strips = sweep::strips(triangles, &border)?;
     sweep::no_gap(field, frustum, &strips)?;
     let doubled_area = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
+}
+
+/// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
+/// skirt; and that they leave out nothing in sight. `skirts` are upright triangles
+/// ([`expand::skirts`](crate::draw::expand::skirts)).
+///
+/// # Panics
+/// As [`prove`].
+pub fn prove_with_skirts(
+    field: &Field,
+    frustum: &Frustum,
+    triangles: &[Drawn],
+    skirts: &[Drawn],
+) -> Result<Proof, Box<CounterExample>> {
+    assert!(field.size().iter().all(|&n| n <= 1 << 24) && triangles.len() <= 1 << 31);
+    on_the_field(field, triangles)?;
+    faces_up(triangles)?;
+    let border = seams::border(field, triangles, skirts)?;
+    let strips = sweep::strips(triangles, &border)?;
+    sweep::no_gap(field, frustum, &strips)?;
+    let doubled_area = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
+    Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
+}
+
+/// The proof of a list whose meshes are said to meet in this way, expanded in this view.
+///
+/// # Panics
+/// As [`prove`].
+pub fn prove_list(
+    field: &Field,
+    view: &View,
+    seams: Seams,
+    resident: &Geometry,
+    list: &DrawList,
+) -> Result<Proof, Box<CounterExample>> {
+    let (frame, frustum) = (Frame::placing(field, view), view.frustum());
+    let triangles = expand::triangles(field, &frame, resident, list);
+    match seams {
+        Seams::Shared => prove(field, &frustum, &triangles),
+        Seams::Skirts => {
+            let skirts = expand::skirts(field, &frame, resident, list);
+            prove_with_skirts(field, &frustum, &triangles, &skirts)
+        }
+    }
 }
 
 /// A refutation by some of the triangles.

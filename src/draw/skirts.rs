@@ -1,0 +1,104 @@
+//! Meshes with skirts: four quadrants that share no vertex, and walls that hang under their sides.
+//!
+//! Each quadrant is a grid of lines of its own, with one line more beyond each of its sides, and two such grids lie
+//! along an axis: quadrants of s units make 2 (s + 3) lines. They are numbered from 0 to `cells` = 2 s + 5, an odd
+//! number, which no other mesh has, and a quarter turn maps them onto each other as it does those of other meshes.
+//! So the place alone tells the quadrant of a vertex and whether it is a skirt's: one on a line beyond a side lies
+//! under the nearest vertex of that side.
+//!
+//! Quadrants go over to coarser levels by themselves, sides included, and no vertex falls onto another: of an
+//! instance's weights word 0 is as in [`weights`](super::weights), and words 1 and 2 are [`set`] here.
+
+use super::Instance;
+use super::weights::{FINER, get, inside};
+
+/// Set in the level of a skirt's vertex, as fragments are told it.
+pub const SKIRT: u32 = 1 << 31;
+
+/// A vertex of a mesh with skirts, after the turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hung {
+    /// Mesh units as in other meshes, where quadrants meet on a line: of a skirt's vertex, what it hangs from.
+    pub at: [i32; 2],
+    /// The quadrant, `(x half) + 2 (z half)`.
+    pub quadrant: usize,
+    /// The side that a skirt's vertex is beyond: x first, z first, x last, z last.
+    pub side: Option<usize>,
+}
+
+/// `cells` of a mesh of quadrants of so many units a side.
+pub fn cells(quadrant_units: u32) -> u32 {
+    2 * quadrant_units + 5
+}
+
+/// The line of a quadrant's half (0 or 1) and a place in it: from −1, beyond its first side, to one beyond its last.
+pub fn line(quadrant_units: i32, half: i32, place: i32) -> i32 {
+    half * (quadrant_units + 3) + place + 1
+}
+
+/// Whether an instance's mesh has skirts.
+pub fn is_skirted(instance: &Instance) -> bool {
+    instance.cells & 1 == 1
+}
+
+/// What a turned vertex is.
+pub fn hung(instance: &Instance, turned: [i32; 2]) -> Hung {
+    let lines = (instance.cells as i32 + 1) / 2;
+    let half = turned.map(|n| n / lines);
+    let place = [0, 1].map(|k| turned[k] % lines - 1);
+    let last = lines - 3;
+    let at = [0, 1].map(|k| half[k] * last + place[k].clamp(0, last));
+    let side = (0..2).find_map(|k| match place[k] {
+        -1 => Some(k),
+        n if n > last => Some(k + 2),
+        _ => None,
+    });
+    Hung { at, quadrant: (half[0] + 2 * half[1]) as usize, side }
+}
+
+/// Level of detail of a quadrant.
+pub fn quadrant_level(instance: &Instance, quadrant: usize) -> i32 {
+    instance.level as i32 - i32::from(get(instance, inside(quadrant)) & FINER != 0)
+}
+
+/// How far a vertex hangs down, metres: 0 where its side has no skirt.
+pub fn depth(instance: &Instance, hung: &Hung) -> f32 {
+    match hung.side {
+        Some(side) if instance.weights[1] >> (4 * hung.quadrant + side) & 1 == 1 => f32::from_bits(instance.weights[2]),
+        _ => 0.0,
+    }
+}
+
+/// Gives the sides of the quadrants whose bits, 4 · quadrant + side, are set skirts of a depth in metres.
+pub fn set(weights: &mut [u32; 4], sides: u32, depth_m: f32) {
+    weights[1] = sides;
+    weights[2] = depth_m.to_bits();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_is_a_place_of_one_quadrant() {
+        let instance = Instance { cells: cells(8), ..Instance::default() };
+        for (half, place) in (0..2).flat_map(|half| (-1..=9).map(move |place| (half, place))) {
+            let found = hung(&instance, [line(8, half, place), line(8, 1, 3)]);
+            let side = [(-1, 0), (9, 2)].into_iter().find(|&(beyond, _)| beyond == place).map(|(_, side)| side);
+            let at = [8 * half + place.clamp(0, 8), 11];
+            assert_eq!(found, Hung { at, quadrant: half as usize + 2, side }, "{half} {place}");
+        }
+        assert_eq!(line(8, 1, 9), instance.cells as i32, "the last line");
+    }
+
+    #[test]
+    fn skirts_hang_where_they_are_set() {
+        let mut instance = Instance { cells: cells(8), ..Instance::default() };
+        set(&mut instance.weights, 1 << (4 * 2 + 1), 7.5);
+        let hangs = |x, z| depth(&instance, &hung(&instance, [x, z]));
+        assert_eq!(hangs(line(8, 0, 5), line(8, 1, -1)), 7.5);
+        assert_eq!(hangs(line(8, 0, 5), line(8, 1, 0)), 0.0, "the side itself");
+        assert_eq!(hangs(line(8, 0, 5), line(8, 1, 9)), 0.0, "the other side");
+        assert_eq!(hangs(line(8, 1, 5), line(8, 1, -1)), 0.0, "another quadrant");
+    }
+}

@@ -1,0 +1,115 @@
+//! Skirts on the screen: they hide every gap, they are counted, and how deep they hang does not show.
+
+use std::sync::Arc;
+
+use cuesta::draw::{DrawList, Geometry, Limits, Seams, skirts};
+use cuesta::gpu::Gpu;
+use cuesta::height::{Field, synth};
+use cuesta::lod::Technique;
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::holes::{Truth, skirts as skirt_pixels};
+use cuesta::scene::{Copy, Scene};
+use cuesta::view::View;
+
+use super::{aslant, difference, on_device, shoot, technique};
+use crate::conformance::cases;
+
+/// Clusters whose skirts hang down so many times as deep.
+struct Deeper {
+    inner: Box<dyn Technique>,
+    factor: f32,
+}
+
+impl Technique for Deeper {
+    fn resident(&self) -> &Geometry {
+        self.inner.resident()
+    }
+    fn limits(&self) -> Limits {
+        self.inner.limits()
+    }
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.inner.select(view, list);
+        for instance in &mut list.instances {
+            let [_, sides, depth, _] = instance.weights;
+            skirts::set(&mut instance.weights, sides, self.factor * f32::from_bits(depth));
+        }
+    }
+    fn keeps_tolerance(&self) -> bool {
+        self.inner.keeps_tolerance()
+    }
+    fn morphs(&self) -> bool {
+        self.inner.morphs()
+    }
+    fn seams(&self) -> Seams {
+        self.inner.seams()
+    }
+}
+
+fn skirted(field: &Arc<Field>, morph: &str, factor: f32) -> Deeper {
+    Deeper { inner: technique(field, "clusters", &["block=8", morph, "seams=skirts"]), factor }
+}
+
+/// Pixels of a view where the sky shines through.
+fn hole_pixels(gpu: &Arc<Gpu>, field: &Arc<Field>, view: &View, picture: &image::RgbaImage) -> usize {
+    let look = Look::default();
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
+    let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
+    Truth::new(&scene, view).unwrap().hole_pixels(view, picture).len()
+}
+
+fn count(picture: &image::RgbaImage) -> usize {
+    skirt_pixels(picture).into_iter().filter(|&is| is).count()
+}
+
+#[test]
+fn skirts_are_seen_where_levels_meet_and_hide_every_gap() {
+    on_device(|gpu| {
+        let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
+        let outside = aslant(&field, [640, 480], 4.0);
+        // Within: at the end of the land its skirts would be seen from the side.
+        let eye = field.world_at(150.0, 200.0, f64::from(field.statistics().max) + 200.0);
+        let within = View { eye, world_from_eye: View::turned(40.0, -25.0, 0.0), ..outside };
+        for (view, is_within, morph) in [(outside, false), (within, true)]
+            .into_iter()
+            .flat_map(|(v, is)| ["morph=off", "morph=on"].map(|m| (v, is, m)))
+        {
+            let stitched = shoot(gpu, &field, technique(&field, "clusters", &["block=8", morph]).as_mut(), &view);
+            let [flat, hung, deeper] =
+                [0.0, 1.0, 3.0].map(|factor| shoot(gpu, &field, &mut skirted(&field, morph, factor), &view).picture);
+            let open = [&stitched.picture, &flat, &hung].map(|picture| hole_pixels(gpu, &field, &view, picture));
+            println!("{morph}: {open:?} hole pixels, {} skirt pixels", count(&hung));
+            assert!(open[0] == 0 && open[1] > 0 && open[2] == 0, "{morph}: {open:?} hole pixels");
+            assert_eq!([count(&stitched.picture), count(&flat)], [0, 0]);
+            assert!(count(&hung) > 0, "{morph}");
+            // A gap is closed by the first few metres: what hangs below is hidden.
+            assert!(!is_within || deeper == hung, "{morph}: {:?} differ", difference(&deeper, &hung, 0));
+        }
+    });
+}
+
+#[test]
+fn no_hole_pixels_on_any_field_of_the_laws() {
+    on_device(|gpu| {
+        let mut seen = 0;
+        for (name, field) in cases::fields() {
+            let look = Look::default();
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            let views = cases::views(&field).into_iter().map(|(what, view)| (what, cases::with_tolerance(&view, 4.0)));
+            let truths: Vec<_> = views.map(|(what, view)| (what, view, Truth::new(&scene, &view).unwrap())).collect();
+            for morph in ["morph=off", "morph=on"] {
+                let mut technique = skirted(&field, morph, 1.0);
+                let plan = plan.clone().with_morph(technique.morphs()).with_seams(technique.seams());
+                let mut stage = Scene { plan: &plan, ..scene.clone() }.stage(&technique, [320, 180]).unwrap();
+                for (what, view, truth) in &truths {
+                    stage.draw(&mut technique, view, Copy::Picture).unwrap();
+                    let open = truth.hole_pixels(view, &stage.picture()).len();
+                    assert_eq!(open, 0, "{name}, {what}, {morph}");
+                    seen += count(&stage.picture());
+                }
+            }
+        }
+        assert!(seen > 0);
+        println!("{seen} skirt pixels");
+    });
+}
