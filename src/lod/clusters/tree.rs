@@ -45,7 +45,7 @@ impl Node {
     /// A number of its own among all nodes under a root: two bits for each level above it, and one. `None` beyond
     /// the root.
     pub fn id(self, root: Node) -> Option<u64> {
-        let above = root.level - self.level;
+        let above = root.level.checked_sub(self.level)?;
         let is_under = self.at.iter().all(|n| n >> above == 0);
         is_under.then(|| 1 << (2 * above) | u64::from(self.at[1]) << above | u64::from(self.at[0]))
     }
