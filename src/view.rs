@@ -262,12 +262,7 @@ impl View {
 
     /// What [`View::allowed_error`] is worked out with, for many boxes.
     pub fn allowance(&self) -> Allowance {
-        Allowance {
-            view: *self,
-            forward: self.forward(),
-            focal_px: self.focal_px(),
-            corner: self.corner_ray(),
-        }
+        Allowance { view: *self, forward: self.forward(), focal_px: self.focal_px(), corner: self.corner_ray() }
     }
 
     /// How far, in pixels, the surface drawn at `drawn` is from the truth at `truth`; infinite if either

@@ -111,6 +111,7 @@ impl Laboratory for DeviceLaboratory {
                 vertices: times.gpu.statistics.map(|[vertices, ..]| vertices),
                 draws: list.draws.len() as u64,
                 commands: list.commands() as u64,
+                widening: list.widening,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
@@ -173,7 +174,8 @@ fn look(
     }
     pool.proof(frame, watertight::prove(field, &view.frustum(), &triangles));
     drop(triangles);
-    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), view.tolerance.px);
+    let is_kept = stage.list.widening == 1.0;
+    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), is_kept.then_some(view.tolerance.px));
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
     pool.economy(&economy::economy(field, view, resident, &stage.list), fragments, covered);
     pool.peers(field, view, &stage.depth());

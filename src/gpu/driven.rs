@@ -208,7 +208,8 @@ impl Slot {
     fn new(gpu: &Arc<Gpu>, driver: &Driver, table: &Buffer, scratch: &Buffer) -> Result<Self> {
         use vk::BufferUsageFlags as Usage;
         let storage = Usage::STORAGE_BUFFER | Usage::TRANSFER_SRC;
-        let parameters = Buffer::host(gpu, "selection parameters", 4 * driver.parameters as u64, Usage::STORAGE_BUFFER)?;
+        let parameters =
+            Buffer::host(gpu, "selection parameters", 4 * driver.parameters as u64, Usage::STORAGE_BUFFER)?;
         let bytes = (driver.instances * size_of::<Instance>()) as u64;
         let instances = Buffer::device(gpu, "selected instances", bytes, storage | Usage::VERTEX_BUFFER)?;
         let bytes = (HEAD + driver.draws * COMMAND) as u64;

@@ -52,6 +52,7 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8"]),
                 ("clusters", &["block=8", "morph=on"]),
                 ("clusters:draw-per-block", &["block=16", "morph=on"]),
+                ("clusters:gpu-driven", &["block=8", "morph=on"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());

@@ -102,7 +102,9 @@ impl Refinement {
 
     fn insert(&mut self, sight: &Sight, node: Node, ratio: f32) -> u32 {
         let k = self.splits.len() as u32;
-        self.index.extend(node.id(sight.tree.root()).map(|id| (id, k)));
+        if let Some(id) = node.id(sight.tree.root()) {
+            self.index.insert(id, k);
+        }
         self.levels[node.level as usize].push(k);
         self.splits.push(Split { node, ratio, blocks: 0, children: [None; 4] });
         k
@@ -146,6 +148,7 @@ impl Refinement {
         is_in_sight(sight, node, sight.containment(&sight.extent(node, square.range)))
     }
 
+    #[inline]
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
         self.index.get(&node.id(tree.root())?).copied()
     }
@@ -194,12 +197,15 @@ fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
     match containment {
         Containment::Outside => false,
         Containment::Inside => true,
-        Containment::Crossing => node.level == 0 || (0..4).any(|quadrant| {
-            let child = node.child(quadrant);
-            sight.tree.square(child).is_some_and(|square| {
-                is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
-            })
-        }),
+        Containment::Crossing => {
+            node.level == 0
+                || (0..4).any(|quadrant| {
+                    let child = node.child(quadrant);
+                    sight.tree.square(child).is_some_and(|square| {
+                        is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
+                    })
+                })
+        }
     }
 }
 
