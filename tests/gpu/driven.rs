@@ -84,7 +84,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
     let place = |n: f64, seed: &mut u64| n * (1.2 * random(seed) - 0.1);
     let extent = w * field.spacing[0] + h * field.spacing[1];
     let (x, z) = (place(w, seed), place(h, seed));
-    let eye = field.world_at(x, z, f64::from(field.statistics().mean) + extent * random(seed).powi(4));
+    let eye = field.world_at(x, z, field.statistics().mean + extent * random(seed).powi(4));
     let lens = match random(seed) {
         p if p < 0.3 => Lens::Orthographic { width: 2.0 * extent * random(seed).powi(2), far: 1e9 },
         _ => Lens::Perspective { fov_x: 0.02 + 2.0 * random(seed) },

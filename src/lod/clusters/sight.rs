@@ -11,7 +11,6 @@
 //!
 //! A node in another is in sight only if that is, rounding included: every step is monotone in the node's corners.
 
-use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::tree::{Node, Tree};
@@ -33,7 +32,7 @@ const LEAST: f32 = 1e-18;
 /// Errors begin here, metres, unless they are 0.
 const LEAST_ERROR: f32 = 1e-12;
 /// The ratio of a node without error: never reached.
-const WITHOUT_ERROR: f32 = 1e30;
+pub const WITHOUT_ERROR: f32 = 1e30;
 
 /// See [`ClusterView::metric`].
 const CERTIFIED: u32 = 0;
@@ -209,7 +208,6 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
         band_end,
         band_scale: if band_end > 1.0 { crate::draw::weights::ONE as f32 / (band_end - 1.0) } else { 0.0 },
         culls: culls.into(),
-        ..ClusterView::zeroed()
     }
 }
 
