@@ -113,6 +113,7 @@ impl Laboratory for DeviceLaboratory {
                 vertices: times.gpu.statistics.map(|[vertices, ..]| vertices),
                 draws: list.draws.len() as u64,
                 commands: list.commands() as u64,
+                widening: list.widening,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
@@ -178,7 +179,8 @@ fn look(
         pool.captured(captured.iter().zip(&expanded).all(same));
     }
     pool.proof(frame, watertight::prove_list(field, view, technique.seams(), resident, &stage.list));
-    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), view.tolerance.px);
+    let is_kept = stage.list.widening == 1.0;
+    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), is_kept.then_some(view.tolerance.px));
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
     let depth = stage.depth();
     pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);

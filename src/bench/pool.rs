@@ -75,10 +75,11 @@ impl Quantity {
 }
 
 impl Pool {
-    /// The geometric errors of a frame.
-    pub fn errors(&mut self, frame: usize, errors: &geometric::Errors, tolerance_px: f64) {
+    /// The geometric errors of a frame, and the tolerance unless it was widened: then it was not kept, whatever the
+    /// error.
+    pub fn errors(&mut self, frame: usize, errors: &geometric::Errors, tolerance_px: Option<f64>) {
         self.frames += 1;
-        self.kept += usize::from(errors.screen_px.max <= tolerance_px);
+        self.kept += usize::from(tolerance_px.is_some_and(|px| errors.screen_px.max <= px));
         self.metres.add(&errors.vertical_m);
         self.pixels.add(&errors.screen_px);
         self.silhouette.add(&errors.silhouette_px);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::journal;
-use super::rows::{Case, Errors, Header, Row, SCHEMA, Times};
+use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, extended, kept};
 use super::statistics::{Estimate, middle};
 use crate::height::save::replace;
 
@@ -74,6 +74,10 @@ pub struct TimeSummary {
     pub draws: f64,
     /// Mean draw commands a frame.
     pub commands: f64,
+    /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
+    /// kept.
+    #[serde(with = "extended", default = "kept")]
+    pub widening: f64,
     /// Device bytes, all purposes together.
     pub device_bytes: u64,
 }
@@ -158,6 +162,7 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         triangles: over(|r| r.triangles.mean),
         draws: over(|r| r.draws.mean),
         commands: over(|r| r.commands.mean),
+        widening: rounds.iter().map(|r| r.widening).fold(1.0, f64::max),
         device_bytes: rounds.iter().map(|r| r.device_bytes.values().sum()).max().unwrap_or(0),
     })
 }

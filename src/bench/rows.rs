@@ -161,6 +161,10 @@ pub struct Times {
     pub draws: Spread,
     /// Draw commands recorded a frame.
     pub commands: Spread,
+    /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
+    /// kept.
+    #[serde(with = "extended", default = "kept")]
+    pub widening: f64,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
     /// The most memory that the process has held, bytes.
@@ -377,8 +381,13 @@ impl fmt::Display for Terrain {
     }
 }
 
+/// The factor of a tolerance that was kept: rows of older versions do not say it.
+pub(crate) fn kept() -> f64 {
+    1.0
+}
+
 /// Numbers that may be infinite, which JSON has no number for: they are written as the word "infinite".
-mod extended {
+pub(crate) mod extended {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     #[derive(Serialize, Deserialize)]

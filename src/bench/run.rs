@@ -56,6 +56,8 @@ pub struct Frame {
     pub draws: u64,
     /// Draw commands recorded.
     pub commands: u64,
+    /// What the tolerance was multiplied by: 1 where it was kept.
+    pub widening: f64,
 }
 
 /// What drawing a scene once took.
@@ -248,6 +250,7 @@ impl Times {
             vertices: vertices.map(Spread::of),
             draws: counts(|frame| frame.draws),
             commands: counts(|frame| frame.commands),
+            widening: frames.iter().map(|frame| frame.widening).fold(1.0, f64::max),
             device_bytes: timed.device_bytes,
             host_bytes: host_bytes(),
         }

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, report};
+use crate::bench::rows::extended;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::{Choice, Gpu, Instance};
@@ -62,6 +63,9 @@ struct Rendered {
     commands: usize,
     batches: usize,
     levels: Vec<usize>,
+    /// What the tolerance was multiplied by because there was too much to draw: 1 where it was kept.
+    #[serde(serialize_with = "extended::serialize")]
+    widening: f64,
     prepare_ms: f64,
     select_ms: f64,
     record_ms: f64,
@@ -138,7 +142,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let missed = measured.as_ref().is_some_and(|m| {
         let over = technique.keeps_tolerance()
             && view.tolerance.metric == Metric::Certified
-            && m.error_px.max > view.tolerance.px;
+            && (m.error_px.max > view.tolerance.px || shot.list.widening > 1.0);
         over || m.hole_pixels > 0 || !m.watertight
     });
     let rendered = Rendered {
@@ -153,6 +157,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         commands: shot.list.commands(),
         batches: shot.list.draws.len(),
         levels: shot.list.levels(),
+        widening: shot.list.widening,
         prepare_ms,
         select_ms: shot.times.select_ms,
         record_ms: shot.times.record_ms,

@@ -134,7 +134,7 @@ impl Terrain {
         self.driven.as_ref()
     }
 
-    /// Writes a frame's data and records its uploads, or its selection: before the target begins.
+    /// Writes a frame's data and records its uploads: before the target begins.
     ///
     /// # Panics
     /// If the list exceeds the limits that its technique stated.
@@ -142,9 +142,6 @@ impl Terrain {
         assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
         let slot = &mut self.slots[recording.slot];
         slot.frame.write(0, bytemuck::bytes_of(frame));
-        if list.submission == Submission::Driven {
-            return self.driven.as_mut().context("no selection on this device")?.select(recording, &list.parameters);
-        }
         slot.instances.write(0, cast_slice(&list.instances));
         slot.vertices.write(0, cast_slice(&list.streamed.vertices));
         slot.indices.write(0, cast_slice(&list.streamed.indices));
@@ -158,6 +155,14 @@ impl Terrain {
             self.upload(r, &list.uploads);
             Ok(())
         })
+    }
+
+    /// Records the selection of a list that the device fills: before the target begins.
+    pub fn select(&mut self, recording: &mut Recording, list: &DrawList) -> Result<()> {
+        if list.submission != Submission::Driven {
+            return Ok(());
+        }
+        self.driven.as_mut().context("no selection on this device")?.select(recording, &list.parameters)
     }
 
     fn upload(&mut self, recording: &Recording, uploads: &[Upload]) {

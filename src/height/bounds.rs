@@ -73,6 +73,7 @@ impl Square {
     const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
 
     /// Whether any triangle of the samples' own surface has data.
+    #[inline]
     pub fn has_land(&self) -> bool {
         self.range[0] <= self.range[1]
     }
@@ -135,6 +136,7 @@ impl Bounds {
     }
 
     /// How many levels there are; one square of the last holds the field.
+    #[inline]
     pub fn levels(&self) -> u32 {
         self.levels.len() as u32
     }
@@ -162,21 +164,28 @@ impl Bounds {
     }
 
     /// Samples along a side of the squares of a level.
+    #[inline]
     pub fn side(&self, level: u32) -> u32 {
         self.measure.cells << level
     }
 
     /// Whether a square sticks out of the field.
     pub fn is_partial(&self, level: u32, at: [u32; 2]) -> bool {
-        (0..2).any(|k| (at[k] + 1) * self.side(level) > self.last[k])
+        let side = self.side(level);
+        (at[0] + 1) * side > self.last[0] || (at[1] + 1) * side > self.last[1]
     }
 
     /// The square at a place among those of its level.
+    #[inline]
     pub fn square(&self, level: u32, at: [u32; 2]) -> Square {
-        if self.period == [None; 2] {
+        if let [None, None] = self.period {
             let held = &self.levels[level as usize];
             return held.squares[(at[1] * held.count[0] + at[0]) as usize];
         }
+        self.tiled_square(level, at)
+    }
+
+    fn tiled_square(&self, level: u32, at: [u32; 2]) -> Square {
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);
         // The end of a tiled field cuts squares that are measured whole.

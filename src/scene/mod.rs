@@ -62,7 +62,7 @@ pub struct Times {
     pub select_ms: f64,
     /// Writing the frame's data for the device and recording its uploads.
     pub upload_ms: f64,
-    /// Recording the commands.
+    /// Recording the commands, those of a selection on the device included.
     pub record_ms: f64,
     /// The device, pass by pass.
     pub gpu: Timing,
@@ -136,6 +136,7 @@ impl Stage {
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         let upload_ms = ms(uploading);
         let recorded = Instant::now();
+        self.terrain.select(&mut recording, &self.list)?;
         target::begin(&recording, self.offscreen.attachment(), Some(self.offscreen.kept_depth()));
         self.terrain.draw(&mut recording, &self.list)?;
         target::end(&recording);

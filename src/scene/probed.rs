@@ -144,6 +144,7 @@ impl Stage {
         let mut recording = self.frames.begin()?;
         steps.time("upload", || self.terrain.prepare(&mut recording, &frame, &self.list))?;
         steps.time("record", || {
+            self.terrain.select(&mut recording, &self.list)?;
             target::begin(&recording, self.offscreen.attachment(), Some(self.offscreen.kept_depth()));
             self.terrain.draw_probed(&mut recording, &self.list, probe, pieces)?;
             target::end(&recording);

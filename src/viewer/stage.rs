@@ -137,8 +137,9 @@ impl Stage {
             // They were made when the list was drawn first.
             self.list.uploads.clear();
         } else {
+            // Where there is too much for the device the host widens the tolerance until it fits.
+            let is_driven = self.terrain.driven().is_some() && self.list.widening == 1.0;
             self.list.clear();
-            let is_driven = self.terrain.driven().is_some();
             let select = if is_driven { <dyn Technique>::drive } else { <dyn Technique>::select };
             select(self.technique.as_mut(), shot.view, &mut self.list);
         }
@@ -155,6 +156,7 @@ impl Stage {
         let started = Instant::now();
         let frame = shot.look.frame(&setup.field, shot.view, self.range);
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
+        self.terrain.select(&mut recording, &self.list)?;
         target::begin(&recording, image.attachment, Some(self.swapchain.depth()));
         self.terrain.draw(&mut recording, &self.list)?;
         let Painted { primitives, pixels_per_point, .. } = &mut overlay;

@@ -61,6 +61,7 @@ impl Laboratory for Mock {
                 vertices: (!self.is_bare).then_some(triangles as u64 * 2),
                 draws: 12,
                 commands: 1,
+                widening: 1.0,
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);

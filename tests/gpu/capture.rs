@@ -59,6 +59,7 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8", "seams=skirts"]),
                 ("clusters", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters:draw-per-block", &["block=8", "seams=skirts", "morph=on"]),
+                ("clusters:gpu-driven", &["block=8", "morph=on"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());

@@ -45,9 +45,13 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, settings: &[&str], views: &[View]
     for view in views {
         stage.draw(technique.as_mut(), view, Copy::Nothing).unwrap();
         stage.complete().unwrap();
-        assert_eq!((stage.list.submission, stage.list.widening), (Submission::Driven, 1.0));
+        assert_eq!(stage.list.submission, Submission::Driven);
         let mut list = DrawList::default();
         technique.select(view, &mut list);
+        assert_eq!(stage.list.widening == 1.0, list.widening == 1.0, "both have room, or neither has: {view:?}");
+        if list.widening > 1.0 {
+            continue;
+        }
         let (device, host) = (set(&stage.list), set(&list));
         let is_alike = device == host;
         let only = |a: &Set, b: &Set| a.iter().filter(|one| !b.contains(one)).take(3).cloned().collect::<Set>();
@@ -80,7 +84,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
     let place = |n: f64, seed: &mut u64| n * (1.2 * random(seed) - 0.1);
     let extent = w * field.spacing[0] + h * field.spacing[1];
     let (x, z) = (place(w, seed), place(h, seed));
-    let eye = field.world_at(x, z, f64::from(field.statistics().mean) + extent * random(seed).powi(4));
+    let eye = field.world_at(x, z, field.statistics().mean + extent * random(seed).powi(4));
     let lens = match random(seed) {
         p if p < 0.3 => Lens::Orthographic { width: 2.0 * extent * random(seed).powi(2), far: 1e9 },
         _ => Lens::Perspective { fov_x: 0.02 + 2.0 * random(seed) },
@@ -92,7 +96,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
         size: SIZE,
         near: 0.1,
         tolerance: Tolerance {
-            px: 0.3 + 12.0 * random(seed).powi(3),
+            px: 0.05 + 6.0 * random(seed).powi(3),
             metric: if random(seed) < 0.7 { Metric::Certified } else { Metric::Paper },
         },
     }
@@ -146,7 +150,7 @@ fn from_anywhere_on_any_field_device_and_host_select_alike() {
         ];
         let mut seed = 2;
         for (name, field) in fields {
-            let views: Vec<_> = (0..25).map(|_| anywhere(&field, &mut seed)).collect();
+            let views: Vec<_> = (0..12).map(|_| anywhere(&field, &mut seed)).collect();
             for block in ["block=8", "block=16", "block=32", "block=64", "block=128"] {
                 for setting in ["morph=off", "morph=on", "error=halved"] {
                     // A morph all around a field without end is more than any list holds.
@@ -158,5 +162,59 @@ fn from_anywhere_on_any_field_device_and_host_select_alike() {
                 }
             }
         }
+    });
+}
+
+/// More than fits: the host widens the tolerance and says so, the device draws the root alone and says so.
+#[test]
+fn what_does_not_fit_is_told_and_drawn_coarse() {
+    on_device(|gpu| {
+        let field = Arc::new(half_rough([129, 129]).tiled([90, 90]));
+        let [w, h] = field.size().map(f64::from);
+        let eye = field.world_at(w / 2.0, h / 2.0, 1.5e4);
+        let tolerance = Tolerance { px: 1e-4, metric: Metric::Certified };
+        let lens = Lens::Perspective { fov_x: 1.8 };
+        let rotation = View::turned(0.0, -90.0, 0.0);
+        let view = View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance };
+        let mut technique = technique(&field, "clusters:gpu-driven", &["block=8"]);
+        let mut stage = stage(gpu, &field, technique.as_ref());
+        stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+        stage.complete().unwrap();
+        assert_eq!(stage.list.widening, f64::INFINITY);
+        let [root] = stage.list.instances[..] else { panic!("{} instances", stage.list.instances.len()) };
+        assert_eq!((root.origin, root.cells, root.shift), ([0, 0], 16, root.level as i32 - 1));
+        assert_eq!((stage.list.draws.len(), stage.list.triangles()), (1, 2 * 8 * 8));
+        assert!(8 << root.level >= w as u32 && stage.picture().pixels().all(|pixel| pixel.0[3] > 0), "all is covered");
+        let mut list = DrawList::default();
+        technique.select(&view, &mut list);
+        assert!(list.widening > 1.0 && list.widening.is_finite() && technique.limits().hold(&list.size()));
+        // And it is forgotten.
+        let wider = View { tolerance: Tolerance { px: 400.0, ..tolerance }, ..view };
+        stage.draw(technique.as_mut(), &wider, Copy::Nothing).unwrap();
+        stage.complete().unwrap();
+        list.clear();
+        technique.select(&wider, &mut list);
+        assert_eq!((stage.list.widening, list.widening), (1.0, 1.0));
+        assert!(set(&stage.list) == set(&list) && list.instances.len() > 1);
+    });
+}
+
+/// The picture is the host's, and the draws are counted.
+#[test]
+fn pictures_and_profiles_are_those_of_the_host() {
+    on_device(|gpu| {
+        let field = mountains();
+        let view = super::aslant(&field, SIZE, 1.0);
+        let [host, device] = ["clusters", "clusters:gpu-driven"].map(|name| {
+            let mut technique = technique(&field, name, &["block=8"]);
+            let mut stage = stage(gpu, &field, technique.as_ref());
+            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let picture = stage.picture();
+            let captured = if stage.captures() { stage.capture(technique.as_ref(), &view).unwrap().len() } else { 0 };
+            let probed = stage.draw_probed(technique.as_mut(), "clusters", &view).unwrap();
+            let pieces: Vec<_> = probed.draws.iter().map(|draw| (draw.piece.clone(), draw.counts)).collect();
+            (picture, captured, pieces, stage.list.triangles(), stage.list.draws.clone(), stage.list.commands())
+        });
+        assert!(host == device, "{:?} on the host, {:?} on the device", host.2, device.2);
     });
 }

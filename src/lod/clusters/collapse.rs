@@ -55,11 +55,12 @@ impl Collapse<'_> {
         if split.blocks == ALL && split.node != self.sight.tree.root() {
             return [NOTHING; 4];
         }
-        [0, 1, 2, 3].map(|quadrant| match split.children[quadrant] {
+        let holds = |quadrant: usize| match split.children[quadrant] {
             _ if split.blocks >> quadrant & 1 == 1 => BLOCK,
             Some(child) if self.refinement.splits[child as usize].blocks == ALL => FOUR_BLOCKS,
             _ => NOTHING,
-        })
+        };
+        [holds(0), holds(1), holds(2), holds(3)]
     }
 
     fn push_cluster(&self, split: &Split, drawn: &mut Vec<(u32, Instance)>) {
@@ -105,7 +106,8 @@ impl Collapse<'_> {
 
     /// An instance at a node's first vertex, two mesh units a cell of a level.
     fn placed(&self, node: Node, level: u32) -> Instance {
-        let origin = self.sight.tree.first(node).map(|n| n as i32);
+        let [x, z] = self.sight.tree.first(node);
+        let origin = [x as i32, z as i32];
         Instance { origin, level, shift: level as i32 - 1, ..Instance::default() }
     }
 

@@ -8,7 +8,8 @@
 //! Where this differs from the paper, and why:
 //! - level 0 is the finest, as everywhere here;
 //! - 23 kinds are 23 instanced draws in one indirect submission, not a draw a cluster, which is the variant
-//!   `draw-per-cluster`; its baseline is `draw-per-block`: the same triangles, a draw a block;
+//!   `draw-per-cluster`; in `gpu-driven` the device finds them by itself; the baseline is `draw-per-block`: the same
+//!   triangles, a draw a block;
 //! - with the metric `certified` the error is a bound, which eq. 1 is not off the view axis;
 //! - neighbours are within one level of each other, and a side that meets a coarser block falls onto its edge: no
 //!   skirts are needed. With `seams=skirts` it is as published, and only the skirts' depth is not: it follows from

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::sight::Sight;
+use super::sight::{Sight, WITHOUT_ERROR};
 use super::tree::{Node, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
@@ -24,6 +24,8 @@ pub struct Split {
     pub node: Node,
     /// What the tolerance allows over its ε.
     ratio: f32,
+    /// Whether all of it is in sight for certain.
+    is_inside: bool,
     /// Which of its children are blocks in sight, a bit each.
     pub blocks: u32,
     /// Those of its children that are split, by their place among the split nodes.
@@ -67,7 +69,7 @@ impl Refinement {
         self.levels.iter_mut().for_each(Vec::clear);
         self.splits.clear();
         self.index.clear();
-        self.root = self.descend(sight, root, Containment::Crossing);
+        self.root = look(sight, root, Containment::Crossing).map_or(Found::Nothing, |seen| self.descend(sight, seen));
         for level in 1..root.level as usize {
             for k in 0..self.levels[level].len() {
                 let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
@@ -77,34 +79,29 @@ impl Refinement {
         self.splits.len() <= self.most
     }
 
-    /// What a node is, in one that lies to what can be seen as `around` says.
-    fn descend(&mut self, sight: &Sight, node: Node, around: Containment) -> Found {
-        let Some(square) = sight.tree.square(node) else { return Found::Nothing };
-        let extent = sight.extent(node, square.range);
-        // What is in a node lies no other way than that, if it is not crossed by a plane.
-        let containment = if around == Containment::Crossing { sight.containment(&extent) } else { around };
-        if containment == Containment::Outside && sight.view.culls != 0 {
-            return Found::Nothing;
+    /// What a node is that was looked at, and all that is in it.
+    fn descend(&mut self, sight: &Sight, seen: Seen) -> Found {
+        if seen.ratio >= sight.view.band_end || self.splits.len() > self.most {
+            return block(is_in_sight(sight, seen.node, seen.containment));
         }
-        if node.level > 0 && self.splits.len() <= self.most {
-            let ratio = sight.ratio(&extent, square.error);
-            if ratio < sight.view.band_end {
-                let k = self.insert(sight, node, ratio);
-                for quadrant in 0..4 {
-                    let found = self.descend(sight, node.child(quadrant), containment);
-                    self.splits[k as usize].hold(quadrant, found);
-                }
-                return Found::Split(k);
-            }
+        let k = self.insert(sight, seen.node, seen.ratio, seen.containment);
+        // All four at once: none waits for another.
+        let look = |quadrant| look(sight, seen.node.child(quadrant), seen.containment);
+        for (quadrant, child) in [look(0), look(1), look(2), look(3)].into_iter().enumerate() {
+            let found = child.map_or(Found::Nothing, |child| self.descend(sight, child));
+            self.splits[k as usize].hold(quadrant, found);
         }
-        block(is_in_sight(sight, node, containment))
+        Found::Split(k)
     }
 
-    fn insert(&mut self, sight: &Sight, node: Node, ratio: f32) -> u32 {
+    fn insert(&mut self, sight: &Sight, node: Node, ratio: f32, containment: Containment) -> u32 {
         let k = self.splits.len() as u32;
-        self.index.extend(node.id(sight.tree.root()).map(|id| (id, k)));
+        if let Some(id) = node.id(sight.tree.root()) {
+            self.index.insert(id, k);
+        }
         self.levels[node.level as usize].push(k);
-        self.splits.push(Split { node, ratio, blocks: 0, children: [None; 4] });
+        let is_inside = containment == Containment::Inside;
+        self.splits.push(Split { node, ratio, is_inside, blocks: 0, children: [None; 4] });
         k
     }
 
@@ -126,9 +123,9 @@ impl Refinement {
 
     /// Splits a node that was a leaf, or in one.
     fn split_leaf(&mut self, sight: &Sight, node: Node, ratio: f32) {
-        let k = self.insert(sight, node, ratio);
+        let k = self.insert(sight, node, ratio, Containment::Crossing);
         for quadrant in 0..4 {
-            let child = node.child(quadrant);
+            let child = node.child(quadrant as u32);
             let found = match self.find(sight.tree, child) {
                 Some(place) => Found::Split(place),
                 None => block(self.is_leaf_in_sight(sight, child)),
@@ -137,13 +134,18 @@ impl Refinement {
         }
         // A parent that is split later finds it.
         if let Some(parent) = self.find(sight.tree, node.parent()) {
-            self.splits[parent as usize].hold(node.quadrant(), Found::Split(k));
+            self.splits[parent as usize].hold(node.quadrant() as usize, Found::Split(k));
         }
     }
 
     fn is_leaf_in_sight(&self, sight: &Sight, node: Node) -> bool {
         let Some(square) = sight.tree.square(node) else { return false };
         is_in_sight(sight, node, sight.containment(&sight.extent(node, square.range)))
+    }
+
+    #[inline]
+    fn is_inside(&self, sight: &Sight, node: Node) -> bool {
+        self.find(sight.tree, node).is_some_and(|k| self.splits[k as usize].is_inside)
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
@@ -166,22 +168,44 @@ impl Refinement {
         let Some(beyond) = node.beyond(side) else { return own };
         match self.weight(sight, beyond) {
             Some(weight) => own.max(weight),
-            None if !sight.draws(beyond) => own,
+            // Where all of a node is in sight, so is the side that the other one shares with it.
+            None if sight.tree.square(beyond).is_none() => own,
+            None if !self.is_inside(sight, node) && !sight.draws(beyond) => own,
             None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
         }
     }
 }
 
 impl Split {
-    fn hold(&mut self, quadrant: u32, found: Found) {
-        let k = quadrant as usize;
+    fn hold(&mut self, quadrant: usize, found: Found) {
         self.blocks &= !(1 << quadrant);
         match found {
             Found::Nothing => {}
             Found::Block => self.blocks |= 1 << quadrant,
-            Found::Split(place) => self.children[k] = Some(place),
+            Found::Split(place) => self.children[quadrant] = Some(place),
         }
     }
+}
+
+/// A node, how it lies to what can be seen, and what the tolerance allows over its ε.
+struct Seen {
+    node: Node,
+    containment: Containment,
+    ratio: f32,
+}
+
+/// Looks at a node in one that lies to what can be seen as `around` says. `None`: nothing of it is drawn.
+#[inline]
+fn look(sight: &Sight, node: Node, around: Containment) -> Option<Seen> {
+    let square = sight.tree.square(node)?;
+    let extent = sight.extent(node, square.range);
+    // What is in a node lies no other way than that, if it is not crossed by a plane.
+    let containment = if around == Containment::Crossing { sight.containment(&extent) } else { around };
+    if containment == Containment::Outside && sight.view.culls != 0 {
+        return None;
+    }
+    let ratio = if node.level > 0 { sight.ratio(&extent, square.error) } else { WITHOUT_ERROR };
+    Some(Seen { node, containment, ratio })
 }
 
 fn block(is_seen: bool) -> Found {

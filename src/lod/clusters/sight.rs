@@ -11,7 +11,7 @@
 //!
 //! A node in another is in sight only if that is, rounding included: every step is monotone in the node's corners.
 
-use bytemuck::Zeroable;
+use glam::Vec3;
 
 use super::tree::{Node, Tree};
 use crate::draw::layout::ClusterView;
@@ -32,7 +32,7 @@ const LEAST: f32 = 1e-18;
 /// Errors begin here, metres, unless they are 0.
 const LEAST_ERROR: f32 = 1e-12;
 /// The ratio of a node without error: never reached.
-const WITHOUT_ERROR: f32 = 1e30;
+pub const WITHOUT_ERROR: f32 = 1e30;
 
 /// See [`ClusterView::metric`].
 const CERTIFIED: u32 = 0;
@@ -45,22 +45,25 @@ pub struct Sight<'a> {
     pub tree: &'a Tree,
     /// The view, as the device gets it too.
     pub view: ClusterView,
+    planes: [(Vec3, f32); 5],
 }
 
 /// A box relative to the eye, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
     /// Smallest corner.
-    pub low: [f32; 3],
+    pub low: Vec3,
     /// Largest corner.
-    pub high: [f32; 3],
+    pub high: Vec3,
 }
 
 impl<'a> Sight<'a> {
     /// A view whose tolerance has a band from 1 to `band_end`. `culls`: nodes out of sight are left as they are; else
     /// they are not, so that no turn of the eye changes what is seen.
     pub fn new(tree: &'a Tree, view: &View, band_end: f32, culls: bool) -> Self {
-        Self { tree, view: cluster_view(tree, view, band_end, culls) }
+        let view = cluster_view(tree, view, band_end, culls);
+        let planes = [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane];
+        Self { tree, view, planes: planes.map(|[x, y, z, w]| (Vec3::new(x, y, z), w)) }
     }
 
     /// Whether a node has land, in sight if that matters.
@@ -72,25 +75,29 @@ impl<'a> Sight<'a> {
     }
 
     /// The box around a node with heights in a range.
+    #[inline]
     pub fn extent(&self, node: Node, [low, high]: [f32; 2]) -> Extent {
         let [first, end] = self.tree.corners(node);
-        let corner = |at: [u32; 2], height: f32| {
-            let along = |k: usize| {
-                let metres = (at[k] as i32 - self.view.anchor[k]) as f32 * self.view.spacing[k];
-                metres + self.view.anchor_relative[k]
-            };
-            let above = (height - self.view.anchor_height) + self.view.anchor_height_relative;
-            [along(0), above, along(1)].map(|metres| metres.max(-FARTHEST).min(FARTHEST))
+        Extent { low: self.corner(first, low), high: self.corner(end, high) }
+    }
+
+    #[inline]
+    fn corner(&self, at: [u32; 2], height: f32) -> Vec3 {
+        let view = &self.view;
+        let along = |k: usize| {
+            let metres = (at[k] as i32 - view.anchor[k]) as f32 * view.spacing[k];
+            metres + view.anchor_relative[k]
         };
-        Extent { low: corner(first, low), high: corner(end, high) }
+        let above = (height - view.anchor_height) + view.anchor_height_relative;
+        Vec3::new(along(0), above, along(1)).max(Vec3::splat(-FARTHEST)).min(Vec3::splat(FARTHEST))
     }
 
     /// How a box lies to what can be seen; `Crossing` when in doubt.
+    #[inline]
     pub fn containment(&self, extent: &Extent) -> Containment {
-        let view = &self.view;
         let mut containment = Containment::Inside;
-        for [x, y, z, w] in [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane] {
-            let [least, most, size] = along([x, y, z], extent);
+        for (normal, w) in self.planes {
+            let [least, most, size] = along(normal, extent);
             let slack = SLACK * (size + w.abs());
             if (most + w) + slack < 0.0 {
                 return Containment::Outside;
@@ -103,6 +110,7 @@ impl<'a> Sight<'a> {
     }
 
     /// What the tolerance allows in a box over an error: below 1 that is too coarse. Never above the exact value.
+    #[inline]
     pub fn ratio(&self, extent: &Extent, error: f32) -> f32 {
         if error == 0.0 {
             return WITHOUT_ERROR;
@@ -111,7 +119,7 @@ impl<'a> Sight<'a> {
         let distance = distance(extent).max(view.near);
         let (over, under) = match view.metric {
             CERTIFIED => {
-                let [nearest, _, size] = along(view.forward, extent);
+                let [nearest, _, size] = along(view.forward.into(), extent);
                 let depth = (nearest - SLACK * size).max(distance * view.inverse_corner).max(view.near).min(DEEPEST);
                 let aside = farthest_aside(extent).min(view.corner * depth);
                 (depth * depth, view.scale * aside + view.lean * depth)
@@ -125,6 +133,7 @@ impl<'a> Sight<'a> {
 }
 
 /// 1 / √x, never above it, and at most 5 · 10⁻⁶ below. The start is that of Lomont, "Fast Inverse Square Root" (2003).
+#[inline]
 pub fn inverse_root(x: f32) -> f32 {
     let start = f32::from_bits(0x5f37_5a86 - (x.to_bits() >> 1));
     let newton = |y: f32| y * (1.5 - (0.5 * x) * (y * y));
@@ -132,25 +141,31 @@ pub fn inverse_root(x: f32) -> f32 {
 }
 
 /// Distance of a box from the eye.
+#[inline]
 fn distance(extent: &Extent) -> f32 {
-    let [x, y, z] = [0, 1, 2].map(|k| extent.low[k].max(-extent.high[k]).max(0.0));
-    let square = ((x * x + y * y) + z * z).max(LEAST);
+    let away = extent.low.max(-extent.high).max(Vec3::ZERO);
+    let square = sum(away * away).max(LEAST);
     square * inverse_root(square)
 }
 
 /// Largest horizontal distance of a box from the eye.
+#[inline]
 fn farthest_aside(extent: &Extent) -> f32 {
-    let [x, z] = [0, 2].map(|k| extent.low[k].abs().max(extent.high[k].abs()));
-    let square = (x * x + z * z).max(LEAST);
+    let far = extent.low.abs().max(extent.high.abs());
+    let square = (far.x * far.x + far.z * far.z).max(LEAST);
     square * inverse_root(square)
 }
 
 /// The least and the greatest `direction · p` over a box, and how great its terms may be.
-fn along(direction: [f32; 3], extent: &Extent) -> [f32; 3] {
-    let ends = [0, 1, 2].map(|k| [direction[k] * extent.low[k], direction[k] * extent.high[k]]);
-    let [least, most] = [ends.map(|[a, b]| a.min(b)), ends.map(|[a, b]| a.max(b))];
-    let size = ends.map(|[a, b]| a.abs().max(b.abs()));
-    [least, most, size].map(|[x, y, z]| (x + y) + z)
+#[inline]
+fn along(direction: Vec3, extent: &Extent) -> [f32; 3] {
+    let (a, b) = (direction * extent.low, direction * extent.high);
+    [sum(a.min(b)), sum(a.max(b)), sum(a.abs().max(b.abs()))]
+}
+
+#[inline]
+fn sum(terms: Vec3) -> f32 {
+    (terms.x + terms.y) + terms.z
 }
 
 /// A value as both sides may compute with it.
@@ -193,7 +208,6 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
         band_end,
         band_scale: if band_end > 1.0 { crate::draw::weights::ONE as f32 / (band_end - 1.0) } else { 0.0 },
         culls: culls.into(),
-        ..ClusterView::zeroed()
     }
 }
 

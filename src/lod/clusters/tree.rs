@@ -19,22 +19,26 @@ pub const SIDES: [usize; 4] = [0, 1, 2, 3];
 
 impl Node {
     /// A child, number `q = (x half) + 2 (z half)`.
+    #[inline]
     pub fn child(self, quadrant: u32) -> Node {
         let [i, j] = self.at;
         Node { level: self.level - 1, at: [2 * i + (quadrant & 1), 2 * j + (quadrant >> 1)] }
     }
 
     /// The node that it is a child of.
+    #[inline]
     pub fn parent(self) -> Node {
-        Node { level: self.level + 1, at: self.at.map(|n| n / 2) }
+        Node { level: self.level + 1, at: [self.at[0] / 2, self.at[1] / 2] }
     }
 
     /// Which child of its parent it is.
+    #[inline]
     pub fn quadrant(self) -> u32 {
         (self.at[0] & 1) + 2 * (self.at[1] & 1)
     }
 
     /// The node of the same level beyond a side, if it is not before the field's first sample.
+    #[inline]
     pub fn beyond(self, side: usize) -> Option<Node> {
         let mut at = self.at;
         let n = &mut at[side & 1];
@@ -44,10 +48,12 @@ impl Node {
 
     /// A number of its own among all nodes under a root: two bits for each level above it, and one. `None` beyond
     /// the root.
+    #[inline]
     pub fn id(self, root: Node) -> Option<u64> {
         let above = root.level.checked_sub(self.level)?;
-        let is_under = self.at.iter().all(|n| n >> above == 0);
-        is_under.then(|| 1 << (2 * above) | u64::from(self.at[1]) << above | u64::from(self.at[0]))
+        let [i, j] = self.at;
+        let is_under = (i | j) >> above == 0;
+        is_under.then(|| 1 << (2 * above) | u64::from(j) << above | u64::from(i))
     }
 }
 
@@ -99,14 +105,17 @@ impl Tree {
     }
 
     /// Lattice position of a node's first vertex.
+    #[inline]
     pub fn first(&self, node: Node) -> [u32; 2] {
-        node.at.map(|n| n * self.bounds.side(node.level))
+        let side = self.bounds.side(node.level);
+        [node.at[0] * side, node.at[1] * side]
     }
 
     /// Lattice positions of a node's first and last vertex that are in the field.
+    #[inline]
     pub fn corners(&self, node: Node) -> [[u32; 2]; 2] {
-        let (first, side) = (self.first(node), self.bounds.side(node.level));
-        [first, [0, 1].map(|k| (first[k] + side).min(self.last[k]))]
+        let ([x, z], side) = (self.first(node), self.bounds.side(node.level));
+        [[x, z], [(x + side).min(self.last[0]), (z + side).min(self.last[1])]]
     }
 
     /// Whether a node sticks out of the field.
@@ -115,9 +124,10 @@ impl Tree {
     }
 
     /// What is known of a node; `None` if it has no land.
+    #[inline]
     pub fn square(&self, node: Node) -> Option<Square> {
-        let first = self.first(node);
-        if (0..2).any(|k| first[k] >= self.last[k]) {
+        let [x, z] = self.first(node);
+        if x >= self.last[0] || z >= self.last[1] {
             return None;
         }
         let square = self.bounds.square(node.level, node.at);
@@ -138,6 +148,7 @@ impl Tree {
     }
 
     /// The error of a square of a level in which `measured` was measured.
+    #[inline]
     pub fn error(&self, level: u32, measured: f32) -> f32 {
         match self.errors {
             Errors::Measured => measured,
