@@ -28,7 +28,7 @@ const BREAKERS: &[Breaker] = &[
     ("one surface", "too narrow a frustum", "Gap", "131 × 67", |field| in_another_view(field, narrower)),
     ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| each_depth(list, 0.5))),
     ("one surface", "a side without its skirt", "Seam", "131 × 67", |field| skirted(field, drop_a_skirt)),
-    ("one surface", "skirts where none are said to be", "TJunction", "131 × 67", |field| {
+    ("one surface", "skirts where none are said to be", "", "131 × 67", |field| {
         Box::new(Changed { seams: Seams::Shared, inner: clusters(field), change: |_| () })
     }),
     ("everything in sight is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
