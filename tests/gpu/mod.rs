@@ -3,6 +3,7 @@
 
 mod bench;
 mod capture;
+mod detail;
 mod golden;
 mod layout;
 mod neck;
