@@ -4,6 +4,7 @@
 #include "frame.glsl"
 #include "position.glsl"
 #include "sky.glsl"
+#include "detail.glsl"
 #include "shading.glsl"
 
 layout(set = 1, binding = 0) uniform sampler2D depths;

@@ -48,9 +48,11 @@ float true_height(Cell cell) {
 }
 
 float linear_height(vec2 lattice) {
-    vec2 absolute = lattice + vec2(frame.anchor);
     if (FILTERED) {
-        vec2 uv = (absolute + 0.5) / vec2(frame.stored);
+        ivec2 anchor = frame.anchor;
+        // Far away a float has no parts of samples left: back by whole repetitions.
+        if (TILED) anchor -= anchor / frame.stored * frame.stored * ivec2(greaterThan(abs(anchor), ivec2(4096)));
+        vec2 uv = (lattice + vec2(anchor) + 0.5) / vec2(frame.stored);
         float stored = textureLod(height_pages, vec3(uv, 0.0), 0.0).r;
         return CODED ? (stored * 65535.0 - frame.height_zero) * frame.height_scale : stored;
     }
@@ -76,9 +78,14 @@ vec3 normal_at(vec2 lattice, float pixel) {
     return normalize(vec3(slope_x, 1.0, slope_z));
 }
 
+// From 0 at the lowest sample to 1 at the highest.
+float share_of_range(float height) {
+    return clamp((height - frame.height_range.x) / max(frame.height_range.y - frame.height_range.x, 1e-6), 0.0, 1.0);
+}
+
 // Hypsometric tint: green lowland, ochre slopes, grey rock, snow.
 vec3 tint(float height, vec3 normal) {
-    float t = clamp((height - frame.height_range.x) / max(frame.height_range.y - frame.height_range.x, 1e-6), 0.0, 1.0);
+    float t = share_of_range(height);
     vec3 colour = mix(vec3(0.11, 0.20, 0.07), vec3(0.27, 0.28, 0.11), smoothstep(0.0, 0.28, t));
     colour = mix(colour, vec3(0.36, 0.28, 0.18), smoothstep(0.25, 0.55, t));
     colour = mix(colour, vec3(0.34, 0.32, 0.31), smoothstep(0.5, 0.75, t));
@@ -113,11 +120,19 @@ vec3 land_colour(vec3 relative, vec2 lattice, uvec2 level_batch) {
     float height = (relative.y - frame.anchor_height_relative) + frame.anchor_height;
 
     vec3 albedo;
+    vec3 ground = vec3(0.0);
+    if (DETAIL && (COLOUR == 0 || COLOUR == 2)) {
+        float facing = abs(dot(relative, normal)) / max(distance, 1e-30);
+        Spot spot = spot_at(lattice, height, pixel, facing);
+        ground = ground_albedo(spot, share_of_range(height), normal);
+    }
     if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
     else if (COLOUR == 2) albedo = texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
     else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell)) / max(pixel, 1e-30));
     else if (COLOUR == 5) albedo = palette(level_batch.y);
-    else albedo = tint(height, normal);
+    else albedo = DETAIL ? ground : tint(height, normal);
+    // Under a picture from above the ground is lighter or darker than it is on average.
+    if (DETAIL && COLOUR == 2) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
 
     vec3 colour = albedo;
     if (COLOUR == 4) {

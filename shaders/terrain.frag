@@ -4,6 +4,7 @@
 #include "frame.glsl"
 #include "position.glsl"
 #include "sky.glsl"
+#include "detail.glsl"
 #include "shading.glsl"
 
 layout(location = 0) in vec3 in_relative;

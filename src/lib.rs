@@ -6,6 +6,7 @@
 //! - [`view`]: eye, projection, frustum, tolerance.
 //! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
 //! - [`draw`]: the neck: a frame as plain data.
+//! - [`texture`]: textures made at start.
 //! - [`lod`]: the techniques: from a view to a frame.
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
@@ -22,6 +23,8 @@ pub mod view;
 pub mod height;
 
 pub mod draw;
+
+pub mod texture;
 
 pub mod lod;
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 
+use super::paths::TIME_STEP_S;
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
 use super::run::{Frame, Laboratory, Scene, Timed};
@@ -65,7 +66,9 @@ impl DeviceLaboratory {
         if !self.truths.1.contains_key(&frame) {
             let plan =
                 ScenePlan::new(scene.field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-            let truth = Truth::new(&self.scene(scene.field, &plan), &scene.views[frame])?;
+            let look = self.look.after(frame as f64 * TIME_STEP_S);
+            let of_frame = scene::Scene { look: &look, ..self.scene(scene.field, &plan) };
+            let truth = Truth::new(&of_frame, &scene.views[frame])?;
             self.truths.1.insert(frame, truth);
         }
         Ok(&self.truths.1[&frame])
@@ -128,6 +131,7 @@ impl Laboratory for DeviceLaboratory {
         for (frame, view) in scene.views.iter().enumerate() {
             let is_measured = frame % scene.case.every == 0;
             let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
+            stage.time_s = frame as f64 * TIME_STEP_S;
             let times = stage.draw(technique.as_mut(), view, copy)?;
             stage.complete()?;
             if is_measured {

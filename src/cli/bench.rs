@@ -11,13 +11,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::cases::{Choice, Planned};
-use super::scene::{ReadArgs, size};
+use super::scene::{GroundArgs, ReadArgs, size};
 use super::{Common, Outcome, report};
 use crate::bench::compare::{THRESHOLD, compare};
 use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
 use crate::bench::run::{Ended, Run};
 use crate::bench::{Laboratory, SCHEMA};
+use crate::plan::Look;
 
 /// Arguments.
 #[derive(Args, Debug)]
@@ -86,6 +87,9 @@ pub struct MeasureArgs {
     /// How often each case is timed.
     #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub rounds: u32,
+    /// What the ground is like from near, and a sun that moves.
+    #[command(flatten)]
+    pub ground: GroundArgs,
     /// The public benchmark kit; terrains that are given join it.
     #[arg(long)]
     pub kit: bool,
@@ -125,20 +129,20 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
 
 /// Makes what draws. Every [`Scene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
 #[cfg(feature = "vulkan")]
-fn laboratory(common: &Common) -> Result<Box<dyn Laboratory>> {
+fn laboratory(common: &Common, look: Look) -> Result<Box<dyn Laboratory>> {
     let gpu = super::render::open(common, false)?;
-    Ok(Box::new(crate::bench::device::DeviceLaboratory::new(gpu, crate::plan::Look::default())))
+    Ok(Box::new(crate::bench::device::DeviceLaboratory::new(gpu, look)))
 }
 
 #[cfg(not(feature = "vulkan"))]
-fn laboratory(_common: &Common) -> Result<Box<dyn Laboratory>> {
+fn laboratory(_common: &Common, _look: Look) -> Result<Box<dyn Laboratory>> {
     anyhow::bail!("bench: built without Vulkan; `report` and `bench compare` work without it")
 }
 
 fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let folder = args.out.as_deref().context("--out DIR is missing")?;
     let planned = Planned::new(common, args)?;
-    let mut laboratory = laboratory(common)?;
+    let mut laboratory = laboratory(common, args.ground.over(Look::default())?)?;
     let header = header(laboratory.as_mut(), &planned)?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));

@@ -229,6 +229,10 @@ fn arguments(args: &MeasureArgs) -> Vec<String> {
     if !settings.is_empty() {
         list.push(format!("--set {}", joined(&settings)));
     }
+    list.extend(args.ground.detail.then(|| "--detail".to_string()));
+    if args.ground.sun_speed != 0.0 {
+        list.push(format!("--sun-speed {}", args.ground.sun_speed));
+    }
     let [w, h] = args.size;
     if args.kit {
         list.push(format!("--kit (version {})", kit::VERSION));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
@@ -42,6 +42,9 @@ pub struct RenderArgs {
     /// The look.
     #[command(flatten)]
     pub look: LookArgs,
+    /// Seconds since the sun stood where `--sun` says.
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub time: f64,
     /// Draw it so often and report the median times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeat: u32,
@@ -126,6 +129,8 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     }
     let field = Arc::new(args.terrain.load(common)?.field);
     let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    ensure!(args.time.is_finite(), "--time {}: expected seconds", args.time);
+    let look = look.after(args.time);
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let prepared = Instant::now();
     let mut technique = args.technique.build(common, &field)?;

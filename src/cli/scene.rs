@@ -128,6 +128,31 @@ pub struct LookArgs {
     /// Edges only.
     #[arg(long)]
     pub wireframe: bool,
+    /// What the ground is like from near, and a sun that moves.
+    #[command(flatten)]
+    pub ground: GroundArgs,
+}
+
+/// What the ground is like from near, and a sun that moves.
+#[derive(Args, Debug, Clone, Copy)]
+pub struct GroundArgs {
+    /// Show grass, rock, scree and snow from near, by slope and height.
+    #[arg(long)]
+    pub detail: bool,
+    /// Degrees by which the sun's azimuth goes on a second: of the window's time, of a path's at 60 frames a second, of
+    /// `--time` in a picture.
+    #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub sun_speed: f64,
+}
+
+impl GroundArgs {
+    /// A look with it.
+    pub fn over(&self, look: Look) -> Result<Look> {
+        if !self.sun_speed.is_finite() {
+            bail!("--sun-speed {}: expected degrees a second", self.sun_speed);
+        }
+        Ok(Look { detail: self.detail, sun_speed: self.sun_speed, ..look })
+    }
 }
 
 /// [`Metric`] as a word.
@@ -291,7 +316,8 @@ impl LookArgs {
         if !(self.fog.is_finite() && self.fog >= 0.0) {
             bail!("--fog {}: expected a density of 0 or more per metre", self.fog);
         }
-        Ok((Look { colour, sun, fog: self.fog, wireframe: self.wireframe }, picture))
+        let look = Look { colour, sun, fog: self.fog, wireframe: self.wireframe, ..defaults };
+        Ok((self.ground.over(look)?, picture))
     }
 }
 

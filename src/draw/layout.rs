@@ -78,6 +78,10 @@ shared! {
         pixel_slope: float,
         /// Size of a pixel in an orthographic view, metres; 0 in a perspective one.
         pixel_size: float,
+        /// Where the anchor lies in the repetition of the ground's materials (x, z), samples.
+        detail_first: vec2,
+        /// Repetitions of the ground's materials a sample (x, z).
+        detail_scale: vec2,
     }
 
     /// A lattice mesh placed on the field.

@@ -160,6 +160,11 @@ impl Drop for Buffer {
 impl Image {
     /// A device-local image and its view.
     pub fn new(gpu: &Arc<Gpu>, info: ImageInfo) -> Result<Self> {
+        Self::with_levels(gpu, info, 1)
+    }
+
+    /// The same with so many mipmap levels.
+    pub fn with_levels(gpu: &Arc<Gpu>, info: ImageInfo, levels: u32) -> Result<Self> {
         let limit = gpu.limits.max_image_dimension2_d;
         if info.size.iter().any(|&n| n > limit) {
             bail!("{}: {} x {} texels exceed maxImageDimension2D = {limit}", info.purpose, info.size[0], info.size[1]);
@@ -169,7 +174,7 @@ impl Image {
             .image_type(vk::ImageType::TYPE_2D)
             .format(info.format)
             .extent(vk::Extent3D { width: info.size[0], height: info.size[1], depth: 1 })
-            .mip_levels(1)
+            .mip_levels(levels)
             .array_layers(layers)
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(info.usage);

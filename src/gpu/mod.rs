@@ -14,6 +14,7 @@ pub mod frames;
 #[cfg(feature = "viewer")]
 pub mod hud;
 pub mod instance;
+mod materials;
 pub mod memory;
 pub mod oracle;
 pub mod pages;

@@ -30,7 +30,7 @@ impl Pipelines {
     /// Makes the pipelines for a plan, drawing to these formats.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, formats: Formats) -> Result<Self> {
         let image = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
-        let kinds = [vk::DescriptorType::UNIFORM_BUFFER, image, image, image];
+        let kinds = [vk::DescriptorType::UNIFORM_BUFFER, image, image, image, image];
         let bindings: Vec<_> = (0u32..)
             .zip(kinds)
             .map(|(binding, kind)| {

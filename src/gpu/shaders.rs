@@ -57,6 +57,7 @@ impl Constants {
             flag(plan.filtered),
             flag(plan.morph),
             flag(plan.skirts),
+            flag(plan.detail),
         ])
     }
 

@@ -10,6 +10,7 @@ use bytemuck::cast_slice;
 use super::device::Gpu;
 use super::driven::Driven;
 use super::frames::{Recording, SLOTS, once};
+use super::materials;
 use super::memory::{Buffer, Image, memory_barrier};
 use super::pages::{self, Sampling};
 use super::pipelines::Pipelines;
@@ -27,8 +28,8 @@ pub struct Terrain {
     resident: Resident,
     slots: Vec<Slot>,
     descriptors: vk::DescriptorPool,
-    samplers: [vk::Sampler; 3],
-    images: [Image; 3],
+    samplers: [vk::Sampler; 4],
+    images: [Image; 4],
     driven: Option<Driven>,
 }
 
@@ -64,8 +65,12 @@ impl Terrain {
         formats: Formats,
     ) -> Result<Self> {
         let pipelines = Pipelines::new(gpu, plan, formats)?;
-        let images =
-            [pages::heights(gpu, plan, field)?, pages::holes(gpu, plan, field)?, pages::overlay(gpu, overlay)?];
+        let images = [
+            pages::heights(gpu, plan, field)?,
+            pages::holes(gpu, plan, field)?,
+            pages::overlay(gpu, overlay)?,
+            materials::image(gpu, plan)?,
+        ];
         let heights = if !plan.filtered {
             Sampling::Texels
         } else if plan.tiled {
@@ -77,6 +82,7 @@ impl Terrain {
             pages::sampler(gpu, heights)?,
             pages::sampler(gpu, Sampling::Texels)?,
             pages::sampler(gpu, Sampling::Clamped)?,
+            pages::sampler(gpu, Sampling::Repeated)?,
         ];
         let descriptors = descriptor_pool(gpu)?;
         let resident = Resident::new(gpu, kept.geometry)?;
@@ -375,7 +381,7 @@ impl Slot {
         })
     }
 
-    fn describe(&self, gpu: &Gpu, images: &[Image; 3], samplers: [vk::Sampler; 3]) {
+    fn describe(&self, gpu: &Gpu, images: &[Image; 4], samplers: [vk::Sampler; 4]) {
         let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let infos: Vec<_> = images
@@ -399,7 +405,7 @@ fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
     let slots = SLOTS as u32;
     let sizes = [
         vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
-        vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 3 * slots },
+        vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 4 * slots },
     ];
     let info = vk::DescriptorPoolCreateInfo::default().max_sets(slots).pool_sizes(&sizes);
     // SAFETY: the device is alive; Drop destroys the pool.

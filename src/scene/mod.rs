@@ -47,6 +47,8 @@ pub struct Stage {
     plan: ScenePlan,
     look: Look,
     range: [f32; 2],
+    /// Seconds since the sun stood where the look says.
+    pub time_s: f64,
     /// How draws reach the device, if not as the technique says.
     pub submission: Option<Submission>,
     /// What was drawn last.
@@ -109,6 +111,7 @@ impl<'a> Scene<'a> {
             plan: self.plan.clone(),
             look: *self.look,
             range: [statistics.min, statistics.max],
+            time_s: 0.0,
             submission: None,
             list: DrawList::default(),
         })
@@ -130,7 +133,7 @@ impl Stage {
         let started = Instant::now();
         self.select(technique, view);
         let select_ms = ms(started);
-        let frame = self.look.frame(&self.field, view, self.range);
+        let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let mut recording = self.frames.begin()?;
         let uploading = Instant::now();
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
@@ -191,7 +194,7 @@ impl Stage {
             self.floor = Some(Floor::new(&self.gpu, &self.plan, layout, &self.offscreen)?);
         }
         let floor = self.floor.as_ref().expect("just made");
-        let frame = self.look.frame(&self.field, view, self.range);
+        let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let started = Instant::now();
         let mut recording = self.frames.begin()?;
         self.terrain.prepare(&mut recording, &frame, &DrawList::default())?;

@@ -136,6 +136,7 @@ impl<'a> App<'a> {
             };
             hud::paint(&open.context, size, scale, &content)
         };
+        let look = look.after(self.started.elapsed().as_secs_f64());
         let shot = Shot { view: &view, look: &look, frozen, wants_copy };
         if let Some(shown) = open.stage.show(self.setup, &shot, overlay)? {
             if let Some(dt) = dt {

@@ -3,6 +3,7 @@
 
 mod bench;
 mod capture;
+mod detail;
 mod driven;
 mod golden;
 mod layout;

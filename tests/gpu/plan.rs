@@ -30,6 +30,10 @@ fn forced_features_show_the_same_picture() {
         // The look's density is 0.
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });
+        let normals = Look { colour: Colour::Normal, ..Look::default() };
+        let of_normals = ScenePlan::new(&field, &normals, &gpu.device_limits()).unwrap();
+        let detailed = ScenePlan { detail: true, ..of_normals.clone() };
+        assert_eq!(shoot(&field, &detailed), shoot(&field, &of_normals), "detail");
         let wide = as_f32(&field);
         let wide_plan = ScenePlan { coded: false, ..plan.clone() };
         assert!(difference(&shoot(&wide, &wide_plan), &lean, 2).1 < 0.01, "32-bit heights");
@@ -49,7 +53,12 @@ fn fog_and_colours_are_seen() {
         let looks = [Colour::Height, Colour::Level, Colour::Error, Colour::Normal, Colour::Batch]
             .map(|colour| Look { colour, ..Look::default() })
             .into_iter()
-            .chain([Look { fog: 3e-4, ..Look::default() }, Look { wireframe: true, ..Look::default() }]);
+            .chain([
+                Look { fog: 3e-4, ..Look::default() },
+                Look { wireframe: true, ..Look::default() },
+                Look { detail: true, ..Look::default() },
+                Look { sun_speed: 30.0, ..Look::default() }.after(4.0),
+            ]);
         for look in looks {
             let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
             let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
