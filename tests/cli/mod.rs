@@ -260,6 +260,29 @@ mod with_a_device {
     }
 
     #[test]
+    fn skirt_pixels_are_counted() {
+        if !has_device() {
+            return;
+        }
+        let folder = folder();
+        let view = ["render", "demo", "-o", "p.png", "--size", "640x360", "--measure", "--tolerance", "2"];
+        let of = |seams: &str| {
+            let setting = format!("seams={seams}");
+            json(
+                folder.path(),
+                &[&view[..], &["--technique", "clusters", "--set", "block=8", "--set", &setting]].concat(),
+            )
+        };
+        for (seams, has) in [("stitched", false), ("skirts", true)] {
+            let rendered = of(seams);
+            for count in ["skirt_pixels", "skirt_triangles"] {
+                assert_eq!(rendered[count].as_u64().unwrap() > 0, has, "{seams} {rendered}");
+            }
+            assert_eq!((rendered["hole_pixels"].as_u64(), rendered["watertight"].as_bool()), (Some(0), Some(true)));
+        }
+    }
+
+    #[test]
     fn without_a_subcommand_and_a_display_a_picture_is_drawn() {
         if !has_device() {
             return;

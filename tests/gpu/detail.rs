@@ -73,3 +73,20 @@ fn from_afar_it_fades_into_the_mean() {
         assert!(near > 3.0 && far < near / 3.0 && plain < 0.1, "{near} near, {far} far, {plain} without");
     });
 }
+
+/// However often the field repeats, the device holds as much.
+#[test]
+fn memory_does_not_grow_with_the_tiling() {
+    on_device(|gpu| {
+        let bytes = [1500, 7900].map(|tiles| {
+            let field = Arc::new(synth::synth(synth::Kind::Fractal, [64, 64], 3).tiled([tiles, tiles]));
+            let view = view(field.world_at(300.0, 300.0, 2000.0), -30.0);
+            let look = Look { detail: true, ..Look::default() };
+            let mut technique = technique(&field, "clusters", &["block=16"]);
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+            let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            scene.shoot(technique.as_mut(), &view, 1).unwrap().device_bytes
+        });
+        assert_eq!(bytes[0], bytes[1]);
+    });
+}

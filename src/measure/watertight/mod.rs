@@ -108,8 +108,7 @@ pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Pr
 }
 
 /// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
-/// skirt; and that they leave out nothing in sight. `skirts` are upright triangles
-/// ([`expand::skirts`](crate::draw::expand::skirts)).
+/// skirt; and that they leave out nothing in sight. `skirts` are upright triangles ([`expand::skirts`]).
 ///
 /// # Panics
 /// As [`prove`].

@@ -134,3 +134,71 @@ fn ply_has_the_triangles() {
     let text = String::from_utf8(text).unwrap();
     assert!(text.contains("element vertex 3\n") && text.ends_with("\n3 0 1 2\n"), "{text}");
 }
+
+/// The samples' triangles, those of the east half two metres up, and walls along the seam, `down` metres from the
+/// upper edge and facing west.
+fn step(field: &Field, down: f32) -> [Vec<Drawn>; 2] {
+    let mut triangles = samples_surface(field);
+    for triangle in &mut triangles {
+        let is_east = triangle.corners.iter().all(|c| c.x >= 4);
+        triangle.corners.iter_mut().for_each(|c| c.y = if is_east { 2.0 } else { 0.0 });
+    }
+    let wall = |z: i32| {
+        let at = |z: i32, y: f32| Corner { x: 4, z, y };
+        let (from, to, under_from, under_to) = (at(z, 2.0), at(z + 1, 2.0), at(z, 2.0 - down), at(z + 1, 2.0 - down));
+        [[under_from, to, from], [under_from, under_to, to]].map(|corners| Drawn { corners, instance: 0 })
+    };
+    [triangles, (0..SIDE as i32 - 1).flat_map(wall).collect()]
+}
+
+#[test]
+fn a_step_needs_walls_that_reach_down_and_face_the_lower_side() {
+    let (field, all) = (field(&[]), everything());
+    let found = |[triangles, walls]: &[Vec<Drawn>; 2]| {
+        prove_with_skirts(&field, &all, triangles, walls).map(|proof| proof.doubled_area).map_err(|why| why.kind)
+    };
+    for down in [2.0, 2.5, 50.0] {
+        assert_eq!(found(&step(&field, down)), Ok(128), "{down} m");
+    }
+    assert_eq!(found(&step(&field, 1.999)), Err(Kind::Seam));
+    assert_eq!(found(&[step(&field, 3.0)[0].clone(), Vec::new()]), Err(Kind::Seam));
+    let mut missing = step(&field, 3.0);
+    missing[1].remove(9);
+    assert_eq!(found(&missing), Err(Kind::Seam));
+    let mut turned = step(&field, 3.0);
+    turned[1].iter_mut().for_each(|wall| wall.corners.swap(0, 1));
+    assert_eq!(found(&turned), Err(Kind::Seam));
+    let mut lower = step(&field, 3.0);
+    lower[1].iter_mut().flat_map(|wall| &mut wall.corners).for_each(|corner| corner.y -= 0.5);
+    assert_eq!(found(&lower), Err(Kind::Seam), "they hang half a metre below the edge");
+    assert_eq!(prove(&field, &all, &step(&field, 3.0)[0]).unwrap_err().kind, Kind::Crack);
+}
+
+#[test]
+fn a_coarser_edge_is_held_against_a_finer_one_sample_by_sample() {
+    let field = field(&[]);
+    // The west in two triangles, its edge straight; the east in cells.
+    let [triangles, walls] = step(&field, 2.5);
+    let mut triangles: Vec<_> = triangles.into_iter().filter(|t| t.corners.iter().all(|c| c.x >= 4)).collect();
+    let low = |x: i32, z: i32| Corner { x, z, y: 1.0 };
+    let west = [[low(0, 0), low(0, 8), low(4, 8)], [low(0, 0), low(4, 8), low(4, 0)]];
+    triangles.extend(west.map(|corners| Drawn { corners, instance: 1 }));
+    prove_with_skirts(&field, &everything(), &triangles, &walls).unwrap();
+    // One of the finer vertices far down: there the coarser edge is the upper one, and has no walls.
+    let dip = |c: &mut Corner| {
+        if (c.x, c.z) == (4, 3) {
+            c.y = 0.0
+        }
+    };
+    triangles.iter_mut().flat_map(|t| &mut t.corners).for_each(dip);
+    let why = prove_with_skirts(&field, &everything(), &triangles, &walls).unwrap_err();
+    assert_eq!(why.kind, Kind::Seam, "{why}");
+}
+
+#[test]
+fn a_seam_without_data_may_gape() {
+    let column: Vec<usize> = (0..SIDE as usize).map(|z| z * SIDE as usize + 4).collect();
+    let field = field(&column);
+    let [triangles, _] = step(&field, 3.0);
+    prove_with_skirts(&field, &everything(), &triangles, &[]).unwrap();
+}
