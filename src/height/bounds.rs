@@ -93,10 +93,8 @@ impl Bounds {
         bounds.lay_out(size[0].max(size[1]) - 1);
         let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
         let kept = is_large.then(|| Kept::new(field, &measure.name())).flatten();
-        if let Some(content) = kept.as_ref().and_then(Kept::read) {
-            if bounds.fill(&content) {
-                return bounds;
-            }
+        if kept.as_ref().and_then(Kept::read).is_some_and(|content| bounds.fill(&content)) {
+            return bounds;
         }
         (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level));
         kept.inspect(|kept| kept.write(&bounds.content()));
