@@ -109,8 +109,7 @@ impl Capture {
 
     /// Fills the buffer with what no vertex program writes (a height that is no number).
     pub fn clear(&mut self) {
-        let size = self.buffer.size as usize;
-        self.buffer.write(0, &vec![0xff; size]);
+        self.buffer.fill(0xff);
     }
 
     /// Records the capture of a batch. The recording was prepared with the list it comes from.

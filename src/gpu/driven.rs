@@ -157,7 +157,8 @@ impl Driven {
         let found = self.slots[slot].found.read();
         let tally: Tally = bytemuck::pod_read_unaligned(&found[..HEAD]);
         let commands = found[HEAD..].chunks_exact(COMMAND).take(tally.draws as usize);
-        list.draws = commands.map(draw).collect();
+        list.draws.clear();
+        list.draws.extend(commands.map(draw));
         list.instances.clear();
         list.submission = Submission::Driven;
         list.widening = if tally.overflow == 0 { 1.0 } else { f64::INFINITY };

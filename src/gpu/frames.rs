@@ -94,13 +94,12 @@ impl Frames {
         let slot = &self.slots[self.next];
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let semaphore = |s: vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage);
-        let waits: Vec<_> = wait.into_iter().map(semaphore).collect();
-        let signals: Vec<_> = signal.into_iter().map(semaphore).collect();
+        let (wait, signal) = (wait.map(semaphore), signal.map(semaphore));
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(slot.commands)];
         let submit = [vk::SubmitInfo2::default()
             .command_buffer_infos(&commands)
-            .wait_semaphore_infos(&waits)
-            .signal_semaphore_infos(&signals)];
+            .wait_semaphore_infos(wait.as_slice())
+            .signal_semaphore_infos(signal.as_slice())];
         // SAFETY: the command buffer was begun in this slot and nothing else uses the queue.
         unsafe {
             self.gpu.raw.end_command_buffer(slot.commands)?;

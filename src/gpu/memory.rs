@@ -140,6 +140,16 @@ impl Buffer {
         mapped[offset..offset + data.len()].copy_from_slice(data);
     }
 
+    /// Sets every byte of a host-visible buffer.
+    ///
+    /// # Panics
+    /// If the buffer is not host-visible.
+    pub fn fill(&mut self, byte: u8) {
+        let size = self.size as usize;
+        let mapped = self.memory.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).expect("host-visible");
+        mapped[..size].fill(byte);
+    }
+
     /// The bytes of a host-visible buffer.
     ///
     /// # Panics

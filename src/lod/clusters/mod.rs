@@ -38,7 +38,7 @@ use self::mesh::Mesh;
 use self::refine::Refinement;
 use self::sight::Sight;
 use self::skirts::Skirts;
-use self::states::Seeds;
+use self::states::{MOST_SEEDS, Seeds};
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Seams, Source, Submission, Topology};
@@ -178,10 +178,10 @@ impl Clusters {
 
     /// A draw for each kind of cluster that occurs.
     fn draw_instanced(&self, list: &mut DrawList) {
-        let mut ends = vec![0u32; self.mesh.ranges.len() + 1];
+        let mut ends = [0u32; MOST_SEEDS + 1];
         self.drawn.iter().for_each(|&(seed, _)| ends[seed as usize + 1] += 1);
         (1..ends.len()).for_each(|seed| ends[seed] += ends[seed - 1]);
-        let mut next = ends.clone();
+        let mut next = ends;
         list.instances.resize(self.drawn.len(), Instance::default());
         for &(seed, instance) in &self.drawn {
             let place = &mut next[seed as usize];

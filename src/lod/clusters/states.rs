@@ -7,6 +7,9 @@
 /// finer level (2).
 pub type State = [u8; 4];
 
+/// Seeds at most.
+pub const MOST_SEEDS: usize = 23;
+
 /// Where a quarter turn, (x, z) to (cells − z, x), takes each quadrant.
 const TURNED: [usize; 4] = [1, 3, 0, 2];
 
@@ -76,7 +79,7 @@ mod tests {
     #[test]
     fn every_state_is_a_turned_seed() {
         let seeds = Seeds::new(false);
-        assert_eq!(seeds.states.len(), 23);
+        assert_eq!([seeds.states.len(), MOST_SEEDS], [23; 2]);
         for number in 1..81 {
             let (seed, turns) = seeds.of(state(number));
             assert_eq!(turned(seeds.states[seed], turns), state(number));
