@@ -3,6 +3,7 @@
 mod clusters;
 mod morph;
 mod skirts;
+mod strips;
 
 use std::sync::Arc;
 
