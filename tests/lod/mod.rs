@@ -4,6 +4,7 @@ mod clusters;
 mod morph;
 mod skirts;
 mod strips;
+mod strips_order;
 
 use std::sync::Arc;
 

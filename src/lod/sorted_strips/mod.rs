@@ -15,6 +15,8 @@
 //! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
 //!   one direction. `order=back` turns the list round: both orders are the same triangles;
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them;
+//! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
+//!   paper's variant in three dimensions needs, and a bound would be spent on it;
 //! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
 //!
 //! The surface is made of the samples at quads' corners and middles; plain quads have the crate's alternating
@@ -33,18 +35,23 @@ pub mod table;
 pub mod walk;
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
+
+use rayon::prelude::*;
 
 use self::certified::{Certified, bounds};
+use self::footprint::Footprint;
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream};
-use super::{Entry, Setting, Settings, Technique, Values};
+use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
-use crate::view::{Aabb, Containment, View};
+use crate::view::{Containment, View};
 
 /// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
 /// widened.
@@ -59,7 +66,7 @@ pub const ENTRY: Entry = Entry {
     name: "sorted-strips",
     about: "triangles streamed in the order of sight, strip by strip",
     paper: "Finch & Bishop 1998",
-    variants: &[],
+    variants: &[Variant { name: "serial", about: "walked on one core, row after row: the same list" }],
     settings: &[
         Setting {
             key: "level",
@@ -85,6 +92,12 @@ pub const ENTRY: Entry = Entry {
             default: "20",
             about: "length of a triangle's side on the screen for level=uniform, in tolerances",
         },
+        Setting {
+            key: "blend",
+            values: Values::Words(&["off", "height"]),
+            default: "off",
+            about: "whether vertices of level=uniform go over into the next level, or are there at once",
+        },
     ],
     build: |field, settings| Box::new(SortedStrips::new(field, settings)),
 };
@@ -97,7 +110,9 @@ struct SortedStrips {
     splits: Splits,
     /// Length of a triangle's side, tolerances, if levels are uniform.
     edge: Option<f64>,
+    blends: bool,
     is_back_to_front: bool,
+    is_serial: bool,
     limits: Limits,
     nothing: Geometry,
 }
@@ -121,7 +136,9 @@ impl SortedStrips {
             pages: Pages::none(grid),
             splits: Splits::new(grid),
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
+            blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
             is_back_to_front: settings.word("order") == "back",
+            is_serial: settings.variant() == Some("serial"),
             limits,
             nothing: Geometry::default(),
         }
@@ -130,15 +147,9 @@ impl SortedStrips {
     /// Finds the pages in sight.
     fn look(&mut self, view: &View) {
         let (field, grid, errors) = (&*self.field, self.pages.grid, &self.errors);
-        let range = errors.range();
-        let mut seen = Vec::new();
-        let frustum = view.frustum();
-        let [w, h] = field.size().map(|n| f64::from(n - 1));
-        let [low, high] = range;
-        if low <= high {
-            let land = Aabb { min: field.world_at(0.0, 0.0, low.into()), max: field.world_at(w, h, high.into()) };
-            let polygon = footprint::footprint(view, &land);
-            footprint::raster(&polygon, field.spacing, &grid, |at| {
+        let (mut seen, frustum, range) = (Vec::new(), view.frustum(), errors.range());
+        if range[0] <= range[1] {
+            Footprint::new(field, view, range).visit_pages(&grid, |at| {
                 let page = errors.square(grid.level, at);
                 let bounds = bounds(field, grid.level, at, page.range);
                 if page.has_land() && frustum.contains(&bounds) != Containment::Outside {
@@ -149,25 +160,31 @@ impl SortedStrips {
         self.pages.set(seen);
     }
 
-    /// Walks the rows of a frame; `None` if it would not fit the limits.
+    /// Walks the rows of a frame, in parallel or one after the other to the same streams; `None` if they would not fit
+    /// the limits.
     fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
         let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye };
-        let mut left = (self.limits.vertices, self.limits.indices);
-        let mut streams = Vec::new();
-        for row in rows {
+        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: self.blends };
+        let (vertices, indices) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let is_within = |count: &AtomicUsize, more: usize, most: usize| count.fetch_add(more, Relaxed) + more <= most;
+        let walk = |row: &Row| {
+            // Once there is too much, no further row is begun.
+            if vertices.load(Relaxed) > self.limits.vertices || indices.load(Relaxed) > self.limits.indices {
+                return None;
+            }
             let stream = ground.walk(row);
-            left.0 = left.0.checked_sub(stream.vertices.len())?;
-            left.1 = left.1.checked_sub(stream.indices.len())?;
-            streams.push(stream);
-        }
-        Some(streams)
+            let fits = is_within(&vertices, stream.vertices.len(), self.limits.vertices)
+                && is_within(&indices, stream.indices.len(), self.limits.indices);
+            fits.then_some(stream)
+        };
+        if self.is_serial { rows.iter().map(walk).collect() } else { rows.par_iter().map(walk).collect() }
     }
 
     /// The frame's strips under the view's tolerance, or `None` if they would not fit.
     fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
         if let Some(edge) = self.edge {
             let levels = Radial::uniform(&self.field, view, edge * view.tolerance.px, self.pages.grid.level);
+            let levels = if self.blends { levels.blending(self.pages.grid.level) } else { levels };
             return self.walk(&levels, gaze, rows);
         }
         self.splits.clear();

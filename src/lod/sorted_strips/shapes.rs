@@ -5,16 +5,18 @@
 //!
 //! ```text
 //!  a───────b   a───e───b   a───────────────b   a───────b   a───────b      a ──▸ minor direction
-//!  │     ╱ │   │  ╱ ╲  │   │ ╲           ╱ │   │   ╱ ╱ │   │ ╲ ╲   │      │
-//!  │   ╱   │   │ ╱   ╲ │   │    ╲     ╱    │   │ ╱   ╱ g   f   ╲ ╲ │      ▾
-//!  │ ╱     │   │╱     ╲│   │       ╲╱      │   │ ╱ ╱   │   │ ╲   ╲ │      major direction
+//!  │     ╱ │   │  ╱  ╱ │   │ ╲           ╱ │   │     ╱ │   │   ╱ ╱ │      │
+//!  │   ╱   │   │ ╱ ╱   │   │    ╲     ╱    │   │   ╱ ╱ g   f ╱ ╱   │      ▾
+//!  │ ╱     │   │╱╱     │   │       ╲╱      │   │ ╱ ╱   │   │ ╱     │      major direction
 //!  d───────c   d───────c   d───────m───────c   d───────c   d───────c
 //!   A  plain    B  finer    C  coarser behind:  D  finer    E  finer
 //!                 behind       two advances        ahead      behind us: merging
 //! ```
 //!
-//! Where a quad has finer ones on two or three of its sides, B, D and E are combined: that happens wherever a border
-//! between two levels turns a corner. A's diagonal is that of [`rtin`](crate::height::rtin) at the quad's level.
+//! Every shape keeps A's diagonal, which is that of [`rtin`](crate::height::rtin) at the quad's level, and bisects a
+//! triangle from a middle on its side to the corner across: where the middle lies on the straight side, nothing
+//! changes. C's lines meet where those of its two quads do. Where a quad has finer ones on two or three of its sides,
+//! B, D and E are combined: that happens wherever a border between two levels turns a corner.
 
 /// Vertices of a quad: corners, middles of three sides, and the middle of the front edge of C.
 pub mod slot {
@@ -110,20 +112,23 @@ impl Shapes {
     }
 }
 
+/// The two triangles of a plain quad, each bisected from a middle on its side to the corner across from it.
 fn triangles(middles: usize, rising: bool) -> Vec<[usize; 3]> {
-    const BACK_TRAILING: usize = BACK | TRAILING;
-    const BACK_LEADING: usize = BACK | LEADING;
-    const BOTH_SIDES: usize = TRAILING | LEADING;
-    let rectangle = |[a, b, c, d]: [usize; 4]| if rising { [[a, b, d], [b, c, d]] } else { [[a, c, d], [a, b, c]] };
-    match middles {
-        0 => rectangle([A, B, C, D]).to_vec(),
-        BACK => vec![[A, E, D], [E, C, D], [E, B, C]],
-        TRAILING => vec![[A, B, F], [F, B, C], [F, C, D]],
-        LEADING => vec![[A, B, G], [A, G, D], [G, C, D]],
-        BACK_TRAILING => vec![[A, E, F], [E, C, F], [E, B, C], [F, C, D]],
-        BACK_LEADING => vec![[A, E, D], [E, G, D], [E, B, G], [G, C, D]],
-        BOTH_SIDES => [rectangle([A, B, G, F]), rectangle([F, G, C, D])].concat(),
-        _ => [[[A, E, F], [E, G, F]].to_vec(), vec![[E, B, G]], rectangle([F, G, C, D]).to_vec()].concat(),
+    let middle = |bit: usize, slot: usize| (middles & bit != 0).then_some(slot);
+    let [e, f, g] = [middle(BACK, E), middle(TRAILING, F), middle(LEADING, G)];
+    match rising {
+        false => [bisected([A, B, C], e, g), bisected([C, D, A], None, f)].concat(),
+        true => [bisected([D, A, B], f, e), bisected([B, C, D], g, None)].concat(),
+    }
+}
+
+/// A triangle with middles on its first and its second side, or without.
+fn bisected([p, q, r]: [usize; 3], first: Option<usize>, second: Option<usize>) -> Vec<[usize; 3]> {
+    match (first, second) {
+        (None, None) => vec![[p, q, r]],
+        (Some(m), None) => vec![[p, m, r], [m, q, r]],
+        (None, Some(n)) => vec![[p, q, n], [p, n, r]],
+        (Some(m), Some(n)) => vec![[m, q, n], [p, m, n], [p, n, r]],
     }
 }
 
@@ -208,6 +213,14 @@ mod tests {
     fn each_shape_has_the_middles_it_is_named_by_and_no_others() {
         let shapes = Shapes::default();
         for (middles, rising) in (0..MASKS).flat_map(|k| [(k, false), (k, true)]) {
+            // Nothing changes where middles lie on straight sides.
+            let plain: Vec<_> = shapes.single(0, rising).triangles.clone();
+            let holds = |plain: &[usize; 3], triangle: &[usize; 3]| {
+                let corners = plain.map(|slot| PLACES[slot]);
+                triangle.iter().all(|&p| (0..3).all(|k| side([corners[k], corners[(k + 1) % 3]], PLACES[p]) <= 0.0))
+            };
+            let inner = &shapes.single(middles, rising).triangles;
+            assert!(inner.iter().all(|t| plain.iter().any(|p| holds(p, t))), "{middles} {rising}");
             let triangles = &shapes.single(middles, rising).triangles;
             for (slot, bit) in [(E, BACK), (F, TRAILING), (G, LEADING), (M, 0)] {
                 assert_eq!(triangles.as_flattened().contains(&slot), middles & bit != 0, "{middles} slot {slot}");

@@ -11,6 +11,12 @@ pub trait Levels: Sync {
     /// Whether a square of a level is to be drawn by quads of finer levels. True of every square that a split one
     /// lies in or, one level below, touches; level 0 is never split.
     fn is_split(&self, level: u32, at: [i32; 2]) -> bool;
+
+    /// How far the vertex at a position has gone to its place in the next level, 0 to 1, if `level` is the coarsest that
+    /// has it. It must be 1 where a square of the next level around it, or with it on its side, is not split.
+    fn weight(&self, _level: u32, _at: [i32; 2]) -> f32 {
+        0.0
+    }
 }
 
 /// A set of split squares.
@@ -41,10 +47,11 @@ impl Splits {
 
     /// Empties the set and keeps its memory.
     pub fn clear(&mut self) {
-        for level in 1..self.lists.len() {
-            for at in std::mem::take(&mut self.lists[level]) {
-                let page = at.map(|n| n >> (self.grid.level - level as u32));
-                self.grid.index(page).into_iter().for_each(|k| self.places[k] = 0);
+        let Self { grid, places, lists, .. } = self;
+        for (level, list) in lists.iter_mut().enumerate() {
+            for at in list.drain(..) {
+                let page = at.map(|n| n >> (grid.level - level as u32));
+                grid.index(page).into_iter().for_each(|k| places[k] = 0);
             }
         }
         self.words.clear();

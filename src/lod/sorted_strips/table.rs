@@ -109,6 +109,8 @@ pub struct Radial {
     eye: [f64; 2],
     /// Squared height of the eye above the land under it, metres².
     above_m2: f64,
+    /// By level: the distance from which on it is allowed, metres; empty if vertices do not blend.
+    begins_m: Vec<f64>,
 }
 
 impl Radial {
@@ -134,7 +136,13 @@ impl Radial {
         let eye = [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k]);
         let [x, z] = [0, 1].map(|k| eye[k].clamp(0.0, f64::from(field.size()[k] - 1)) as u32);
         let above_m = (view.eye.y - f64::from(field.height(x, z))).max(0.0);
-        Self { table, spacing: field.spacing, eye, above_m2: above_m * above_m }
+        Self { table, spacing: field.spacing, eye, above_m2: above_m * above_m, begins_m: Vec::new() }
+    }
+
+    /// Vertices of levels below `most` go over into the next level (Finch & Bishop, §4.9).
+    pub fn blending(mut self, most: u32) -> Self {
+        self.begins_m = (0..=most).map(|level| self.table.distance_m(self.table.begin(level))).collect();
+        self
     }
 }
 
@@ -147,6 +155,17 @@ impl Levels for Radial {
         };
         let (x, z) = (away_m(0), away_m(1));
         self.table.level(x * x + z * z + self.above_m2) < level
+    }
+
+    /// It begins half way from where the level begins to where the next one does, and ends there.
+    fn weight(&self, level: u32, at: [i32; 2]) -> f32 {
+        let Some(&[begin, end]) = self.begins_m.get(level as usize..).and_then(|levels| levels.first_chunk()) else {
+            return 0.0;
+        };
+        let [x, z] = [0, 1].map(|k| (f64::from(at[k]) - self.eye[k]) * self.spacing[k]);
+        let distance = (x * x + z * z + self.above_m2).sqrt();
+        let start = (begin + end) / 2.0;
+        if end.is_finite() && end > start { ((distance - start) / (end - start)).clamp(0.0, 1.0) as f32 } else { 0.0 }
     }
 }
 

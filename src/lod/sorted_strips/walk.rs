@@ -29,6 +29,7 @@ use super::pages::{Pages, Row, Run, placed};
 use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
 use super::splits::Levels;
 use crate::draw::ExplicitVertex;
+use crate::draw::place::morphed_height;
 use crate::height::Field;
 
 /// Vertices and indices of a part of a frame.
@@ -54,6 +55,8 @@ pub struct Ground<'a, L> {
     pub major: usize,
     /// Where rays come from, samples.
     pub eye: [f64; 2],
+    /// Whether vertices go over into the next level.
+    pub blends: bool,
 }
 
 /// A vertex that is used but not made yet.
@@ -164,6 +167,42 @@ impl<L: Levels> Ground<'_, L> {
     }
 }
 
+impl<L: Levels> Ground<'_, L> {
+    /// The vertex at a position: the same wherever it is asked for. Its target is the middle of the edge of the next
+    /// level on which it lies, as that edge is drawn (Finch & Bishop, §4.9).
+    fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
+        let [x, z] = position;
+        let height = self.field.height(x as u32, z as u32);
+        let still = ExplicitVertex { position, height, target: height, morph: 0.0 };
+        let level = (x | z).trailing_zeros();
+        if !self.blends || level >= self.pages.grid.level {
+            return still;
+        }
+        let morph = self.levels.weight(level, position);
+        let apart = half_edge(position, level);
+        let ends = [-1, 1].map(|sign| [x + sign * apart[0], z + sign * apart[1]]);
+        let last = self.pages.grid.last;
+        // The field's edge is no vertex of the next level, unless it is whole there.
+        let is_inside =
+            (0..2).all(|k| ((position[k] >> (level + 1)) + i32::from(apart[k] != 0)) << (level + 1) <= last[k]);
+        if morph == 0.0 || !is_inside {
+            return still;
+        }
+        let [a, b] = ends.map(|end| self.vertex(end)).map(|v| morphed_height(v.height, v.target, v.morph));
+        ExplicitVertex { target: (a + b) * 0.5, morph, ..still }
+    }
+}
+
+/// From a vertex that a level is the coarsest to have to one end of the edge of the next level in whose middle it is.
+fn half_edge(position: [i32; 2], level: u32) -> [i32; 2] {
+    let step = 1 << level;
+    let mut apart = position.map(|n| n & step);
+    if apart == [step; 2] && ((position[0] >> (level + 1)) + (position[1] >> (level + 1))) & 1 == 1 {
+        apart[1] = -apart[1];
+    }
+    apart
+}
+
 impl<L: Levels> Walk<'_, L> {
     fn run(&mut self, row: &Row, run: &Run) {
         let Ground { pages, major, .. } = *self.ground;
@@ -243,15 +282,20 @@ impl<L: Levels> Walk<'_, L> {
     fn matches_coarser(&self, square: Square) -> bool {
         let (u, v) = ((square.column + 1) << square.level, square.row << square.level);
         let begins = square.level < self.ground.pages.grid.level && square.column & 1 == 0 && square.row & 1 == 0;
-        begins && self.marks[u as usize].v != v && (v > 0 || self.has_page_behind(u))
+        begins && self.marks[u as usize].v != v && self.has_land_behind(u, v)
     }
 
-    /// Whether the page behind a column of the row's back line is drawn before this one.
+    /// Whether there is a quad behind a column of a strip: beyond the field's edge all are flat, and the page behind
+    /// the row may not be drawn, or later.
     #[inline]
-    fn has_page_behind(&self, u: i32) -> bool {
+    fn has_land_behind(&self, u: i32, v: i32) -> bool {
+        let Pages { grid, .. } = self.ground.pages;
+        let is_beyond = self.origin[1] + self.signs[1] * v >= grid.last[self.ground.major] && self.signs[1] < 0;
+        if v > 0 || is_beyond {
+            return !is_beyond;
+        }
         let [x, z] = self.world(Square { level: 0, column: u, row: -1 });
-        let level = self.ground.pages.grid.level;
-        self.has_behind && self.ground.pages.is_drawn([x >> level, z >> level])
+        self.has_behind && self.ground.pages.is_drawn([x >> grid.level, z >> grid.level])
     }
 
     /// The middle of a square's side on the run's first side, if either of its two squares is split.
@@ -385,8 +429,7 @@ impl<L: Levels> Walk<'_, L> {
         let [u, v] = [self.origin[0] + self.signs[0] * u, self.origin[1] + self.signs[1] * v];
         let (at, last) = (placed(self.ground.major, v, u), self.ground.pages.grid.last);
         let position = [at[0].min(last[0]), at[1].min(last[1])];
-        let height = self.ground.field.height(position[0] as u32, position[1] as u32);
-        self.stream.vertices.push(ExplicitVertex { position, height, target: height, morph: 0.0 });
+        self.stream.vertices.push(self.ground.vertex(position));
         self.stream.vertices.len() as u32 - 1
     }
 }
