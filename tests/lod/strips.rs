@@ -135,19 +135,22 @@ fn ten_thousand_level_functions_give_one_surface_each() {
     assert!(levels.iter().filter(|&&levels| levels > 2).count() > 3000, "most have several levels");
 }
 
-/// The published condition is needed: most level functions that break it give no surface.
+/// The published condition is needed: level functions that break it often give no surface.
 #[test]
 fn level_functions_that_are_not_closed_are_refuted() {
     let frustum = nothing().frustum();
-    let refuted = (0..400u64).filter(|&seed| {
+    let (mut open_ones, mut refuted) = (0, 0);
+    for seed in 0..400u64 {
         let [open, closed] = [false, true].map(|closed| Scene::random(seed, closed));
         let proof = watertight::prove(&open.field, &frustum, &open.triangles());
         let is_whole = proof.is_ok_and(|proof| proof.doubled_area == open.doubled_area());
-        open.splits.count() < closed.splits.count() && !is_whole
-    });
-    let refuted = refuted.count();
-    println!("{refuted} of 400 refuted");
-    assert!(refuted > 200, "{refuted} of 400");
+        let closed = open.splits.count() == closed.splits.count();
+        assert!(!closed || is_whole, "seed {seed}: closed, and no surface");
+        open_ones += u32::from(!closed);
+        refuted += u32::from(!closed && !is_whole);
+    }
+    println!("{refuted} of {open_ones} refuted");
+    assert!(refuted > 50 && refuted * 10 > open_ones * 3, "{refuted} of {open_ones}");
 }
 
 fn is_any_split(scene: &Scene, level: u32) -> bool {
@@ -214,7 +217,8 @@ fn middle_inside(triangle: &Drawn, eye: [f64; 2], towards: [f64; 2]) -> Option<f
 fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32) -> Vec<Vec<f64>> {
     let mut strips = super::technique(field, "sorted-strips", settings);
     let step = |k: u32| {
-        let eye = field.world_at(64.3 + 0.004 * f64::from(k), 40.7, 400.0);
+        let above_m = f64::from(field.statistics().max) + 50.0;
+        let eye = field.world_at(64.3 + 0.004 * f64::from(k), 20.7, above_m);
         let view = View {
             eye,
             world_from_eye: View::turned(90.0, -30.0, 0.0),
@@ -247,6 +251,6 @@ fn blending_leaves_no_jumps() {
         let of = |blend: &str| changes(&blended_heights(&field, &["level=uniform", "edge=20", page, blend], 400));
         let ([jump, _], [step, way]) = (of("blend=off"), of("blend=height"));
         println!("{page}: jumps of {jump} m, blended {step} m a step and {way} m in all");
-        assert!(jump > 2.0 && step < 0.05 * jump && way > 0.1 * jump, "{page}: {jump} {step} {way}");
+        assert!(jump > 1.0 && step < 0.05 * jump && way > 0.1 * jump, "{page}: {jump} {step} {way}");
     }
 }

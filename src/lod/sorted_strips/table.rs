@@ -134,8 +134,7 @@ impl Radial {
     /// A table, seen from the view's eye.
     pub fn new(field: &Field, view: &View, table: Table) -> Self {
         let eye = [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k]);
-        let [x, z] = [0, 1].map(|k| eye[k].clamp(0.0, f64::from(field.size()[k] - 1)) as u32);
-        let above_m = (view.eye.y - f64::from(field.height(x, z))).max(0.0);
+        let above_m = (view.eye.y - ground(field, eye)).max(0.0);
         Self { table, spacing: field.spacing, eye, above_m2: above_m * above_m, begins_m: Vec::new() }
     }
 
@@ -144,6 +143,16 @@ impl Radial {
         self.begins_m = (0..=most).map(|level| self.table.distance_m(self.table.begin(level))).collect();
         self
     }
+}
+
+/// Height of the land at a position, or at the nearest one of the field, metres: continuous, so that blending is.
+fn ground(field: &Field, at: [f64; 2]) -> f64 {
+    let size = field.size();
+    let cell = [0, 1].map(|k| at[k].clamp(0.0, f64::from(size[k] - 2)) as u32);
+    let [u, v] = [0, 1].map(|k| (at[k] - f64::from(cell[k])).clamp(0.0, 1.0));
+    let height = |i: u32, j: u32| f64::from(field.height(cell[0] + i, cell[1] + j));
+    let row = |j: u32| height(0, j) * (1.0 - u) + height(1, j) * u;
+    row(0) * (1.0 - v) + row(1) * v
 }
 
 impl Levels for Radial {
