@@ -13,7 +13,7 @@ use cuesta::lod::{self, Settings};
 use cuesta::view::{Metric, Tolerance, View};
 
 /// Frames of the circle that are timed, and times that each is.
-const FRAMES: u32 = 50;
+const FRAMES: usize = 50;
 const REPEATS: usize = 5;
 
 /// A series: mean triangles and mean of the frames' shortest times, seconds; the time of all frames' lookups included.

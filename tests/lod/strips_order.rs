@@ -106,7 +106,7 @@ fn from_outside(field: &Field) -> Vec<View> {
     let (middle, extent) = (field.world_at(w / 2.0, h / 2.0, range.mean), 20.0 * w.hypot(h));
     let height = f64::from(range.max - range.min);
     let around = (0..12).flat_map(|k| {
-        let (sin, cos) = (f64::from(k % 4) * 1.5708 + 0.7 + 0.05 * f64::from(k / 4)).sin_cos();
+        let (sin, cos) = f64::from(90 * (k % 4) + 40 + 3 * (k / 4)).to_radians().sin_cos();
         let away = |part: f64| middle + DVec3::new(cos * extent * part, height * 0.7, sin * extent * part);
         let towards = View::looking_along(middle - away(1.0));
         let parallel = Lens::Orthographic { width: extent * 0.7, far: 1e6 };
