@@ -15,16 +15,16 @@ use crate::height::surface::{self, Corner};
 pub struct Square {
     /// The largest distance, metres, of its triangles from the samples; at least that of the squares in it.
     pub error: f32,
-    /// Lowest and highest sample, metres; the lowest is above the highest if there is no land.
+    /// Lowest and highest sample, metres; the lowest is above the highest if there are no data.
     pub range: [f32; 2],
 }
 
 impl Square {
     const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
 
-    /// Whether any triangle of the samples' own surface has data.
+    /// Whether any sample has data.
     #[inline]
-    pub fn has_land(&self) -> bool {
+    pub fn has_data(&self) -> bool {
         self.range[0] <= self.range[1]
     }
 
@@ -41,6 +41,8 @@ pub struct Errors {
     is_tiled: [bool; 2],
     /// From level 1.
     levels: Vec<Level>,
+    /// Of the last level: whether any triangle of the samples' own surface has data.
+    land: Vec<bool>,
 }
 
 /// The squares of a level; those of a tiled axis are held once.
@@ -57,13 +59,31 @@ impl Errors {
     pub fn new(field: &Field, most: u32) -> Self {
         let (size, stored) = (field.size(), field.stored());
         let is_tiled = [0, 1].map(|k| size[k] > stored[k]);
-        let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new() };
+        let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new(), land: Vec::new() };
         let patterns = patterns();
         for level in 1..=most {
             let level = errors.measured(field, level, &patterns);
             errors.levels.push(level);
         }
+        errors.land = errors.measured_land(field, most);
         errors
+    }
+
+    fn measured_land(&self, field: &Field, level: u32) -> Vec<bool> {
+        let count = self.levels[level as usize - 1].count;
+        let is_land = |k: u32| {
+            let first = [k % count[0], k / count[0]].map(|n| (n as i32) << level);
+            let last = [0, 1].map(|k| (first[k] + (1 << level)).min(self.last[k]));
+            // Squares that may lie anywhere have land if the field has.
+            let anywhere = count == [1, 1] && self.is_tiled != [false; 2];
+            if anywhere { surface::has_land(field, [0; 2], self.last) } else { surface::has_land(field, first, last) }
+        };
+        (0..count[0] * count[1]).into_par_iter().map(is_land).collect()
+    }
+
+    /// Whether any triangle of the samples' own surface has data in a square of the last level.
+    pub fn has_land(&self, at: [i32; 2]) -> bool {
+        self.land[self.index(self.levels.len() as u32, at)]
     }
 
     /// Bytes held.
@@ -75,7 +95,7 @@ impl Errors {
     #[inline]
     pub fn square(&self, level: u32, at: [i32; 2]) -> Square {
         let square = self.held(level, at);
-        if square.has_land() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
+        if square.has_data() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
             let parent =
                 if self.levels.len() > level as usize { self.held(level + 1, at.map(|n| n >> 1)) } else { square };
             return Square { error: parent.range[1] - parent.range[0], ..square };
@@ -85,9 +105,14 @@ impl Errors {
 
     #[inline]
     fn held(&self, level: u32, at: [i32; 2]) -> Square {
-        let held = &self.levels[level as usize - 1];
-        let [x, z] = [0, 1].map(|k| if self.is_tiled[k] { at[k] as u32 % held.count[k] } else { at[k] as u32 });
-        held.squares[(z * held.count[0] + x) as usize]
+        self.levels[level as usize - 1].squares[self.index(level, at)]
+    }
+
+    #[inline]
+    fn index(&self, level: u32, at: [i32; 2]) -> usize {
+        let count = self.levels[level as usize - 1].count;
+        let [x, z] = [0, 1].map(|k| if self.is_tiled[k] { at[k] as u32 % count[k] } else { at[k] as u32 });
+        (z * count[0] + x) as usize
     }
 
     /// Whether the end of a tiled field cuts a square, or the pair of it and the next, which were measured whole.
@@ -125,7 +150,7 @@ impl Errors {
 
     fn measured_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
         let inner = self.inner(field, level, at);
-        if !inner.has_land() {
+        if !inner.has_data() {
             return inner;
         }
         let parity = ((at[0] + at[1]) & 1) as usize;
@@ -139,7 +164,7 @@ impl Errors {
         if level == 1 {
             let first = [x << 1, z << 1];
             let last = [0, 1].map(|k| self.within(k, first[k] + 2));
-            return Square { error: 0.0, range: range_of_land(field, first, last) };
+            return Square { error: 0.0, range: range_of_data(field, first, last) };
         }
         let exists = |at: &[i32; 2]| (0..2).all(|k| self.is_tiled[k] || at[k] << (level - 1) < self.last[k]);
         let children = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| [2 * x + i, 2 * z + j]);
@@ -165,13 +190,13 @@ impl Errors {
     }
 }
 
-fn range_of_land(field: &Field, first: [i32; 2], last: [i32; 2]) -> [f32; 2] {
-    if !surface::has_land(field, first, last) {
+/// The range of all heights between two positions if any sample there has data: it may be alone among holes.
+fn range_of_data(field: &Field, first: [i32; 2], last: [i32; 2]) -> [f32; 2] {
+    let samples = || (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| (i as u32, j as u32)));
+    if field.holes().count() > 0 && samples().all(|(i, j)| field.is_hole(i, j)) {
         return Square::NOTHING.range;
     }
-    let heights =
-        (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i as u32, j as u32)));
-    heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
+    samples().map(|(i, j)| field.height(i, j)).fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
 }
 
 /// The eight ways to lay (along the strip, forward) onto (x, z): mirrored along either, and exchanged.

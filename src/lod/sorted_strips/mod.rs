@@ -152,7 +152,7 @@ impl SortedStrips {
             Footprint::new(field, view, range).visit_pages(&grid, |at| {
                 let page = errors.square(grid.level, at);
                 let bounds = bounds(field, grid.level, at, page.range);
-                if page.has_land() && frustum.contains(&bounds) != Containment::Outside {
+                if errors.has_land(at) && frustum.contains(&bounds) != Containment::Outside {
                     seen.push(at);
                 }
             });

@@ -31,9 +31,11 @@ impl Table {
     }
 
     /// Levels that double with the distance, so that triangles are as large on the screen: `unit_m` metres away is
-    /// level 1, up to `most`.
-    pub fn doubling(unit_m: f64, most: u32) -> Self {
-        let scale = (ENTRIES - 1) as f64 / (unit_m * f64::from(1u32 << most.saturating_sub(1))).powi(2);
+    /// level 1, up to `most`. The table reaches further by `more_m`, for repairs. Its entries are those of any larger
+    /// unit or divide them, so that a smaller unit never gives a finer level.
+    pub fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
+        let reach_m = unit_m * f64::from(1u32 << most.saturating_sub(1)) + more_m;
+        let scale = 0.25f64.powf((reach_m / ((ENTRIES - 1) as f64).sqrt()).log2().ceil());
         let level = |k: usize| {
             let distance = (k as f64 / scale).sqrt() / unit_m;
             (0..most).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
@@ -120,7 +122,9 @@ impl Radial {
         let [dx, dz] = field.spacing;
         let sample_px = view.focal_px() * dx.max(dz);
         let mut table = match view.lens {
-            Lens::Perspective { .. } => Table::doubling((2.0 * sample_px / edge_px).max(f64::MIN_POSITIVE), most),
+            Lens::Perspective { .. } => {
+                Table::doubling(2.0 * sample_px / edge_px, most, dx.hypot(dz) * f64::from(2u32 << most))
+            }
             // The same level everywhere.
             Lens::Orthographic { .. } => Table::new(
                 vec![(0..most).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8],
@@ -214,7 +218,7 @@ mod tests {
 
     #[test]
     fn doubling_levels_begin_at_doubled_distances() {
-        let table = Table::doubling(10.0, 5);
+        let table = Table::doubling(10.0, 5, 1.0);
         for (distance, level) in [(0.0, 0), (9.0, 0), (11.5, 1), (22.0, 2), (79.0, 3), (81.0, 4), (161.0, 5), (1e9, 5)]
         {
             assert_eq!(table.level(distance * distance), level, "{distance} m");
