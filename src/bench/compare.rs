@@ -1,17 +1,21 @@
 //! What changed from one benchmark to another: times as ratios with intervals, counts and errors exactly.
 //!
+//! A case's time is taken over the floor's of the same frames, drawn in turn with them: what slows the whole machine
+//! down slows both. The floors are compared by themselves, as they tell of shading or of the machine.
+//!
 //! The cases of a technique are tested together, as they tell much smaller changes from noise than one case with its
 //! handful of rounds: round by round the mean over the cases of the time relative to the case's own middle, without the
-//! extreme fifths. That is a regression if the whole interval lies above 1 + threshold. A single case is one if its
-//! whole interval lies above 1 + twice the threshold. Many things are tested at once, so tails are divided among them
-//! (Bonferroni): the chance of any false alarm stays below 5 % even if the truth is the threshold itself.
+//! extreme fifths. That is a regression if the whole interval lies above 1 + threshold. A single case, or all floors
+//! together, are one if the whole interval lies above 1 + twice the threshold. Many things are tested at once, so tails
+//! are divided among the techniques and among the cases (Bonferroni): the chance of any false alarm among them stays
+//! below 5 % even if the truth is the threshold itself.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::results::{CaseResult, Results};
-use super::rows::Errors;
+use super::rows::{Errors, Times};
 use super::statistics::{Estimate, middle, trimmed_mean};
 
 /// What is no regression yet: a tenth.
@@ -24,6 +28,10 @@ const ALARM: f64 = 0.05;
 pub struct Comparison {
     /// Cases that both have.
     pub matched: usize,
+    /// Whether times are over the floor's; milliseconds where one of the two has no floors.
+    pub over_floor: bool,
+    /// Times of the floors, all cases together.
+    pub floors: Option<Change>,
     /// Times by technique, all its cases together.
     pub techniques: Vec<Change>,
     /// Times by case.
@@ -67,28 +75,61 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
     let timed: Vec<_> = pairs.iter().copied().filter(|(a, b)| a.time.is_some() && b.time.is_some()).collect();
-    let test = |what: String, a: &[f64], b: &[f64], family: usize, allowed: f64| {
-        let ratio = Estimate::ratio(a, b, ALARM / family as f64);
-        Change { what, ratio, is_regression: ratio.low > 1.0 + allowed }
-    };
+    let over_floor = timed.iter().all(|(a, b)| [a, b].iter().all(|case| case.rounds.iter().all(has_floor)));
+    let cost = if over_floor { frame_over_floor } else { frame_ms };
     let cases: Vec<_> = timed
         .iter()
-        .map(|(a, b)| test(a.case.to_string(), &times(a), &times(b), timed.len(), 2.0 * threshold))
+        .map(|(a, b)| {
+            let costs = [a, b].map(|case| case.rounds.iter().map(cost).collect());
+            Change::new(a.case.to_string(), &costs, timed.len(), 2.0 * threshold)
+        })
         .collect();
+    let together = |name: &str, pairs: &Pairs, cost: Cost, family: usize, allowed: f64| {
+        Change::new(format!("{name}, {} cases", pairs.len()), &pooled(pairs, cost), family, allowed)
+    };
     let families = by_technique(&timed);
-    let pooled = families.iter().map(|(name, pairs)| {
-        let [a, b] = pooled(pairs);
-        test(format!("{name}, {} cases", pairs.len()), &a, &b, families.len(), threshold)
-    });
-    let techniques: Vec<_> = pooled.collect();
+    let techniques: Vec<_> =
+        families.iter().map(|(name, pairs)| together(name, pairs, cost, families.len(), threshold)).collect();
+    let floors = (over_floor && !timed.is_empty()).then(|| together("floor", &timed, floor_ms, 1, 2.0 * threshold));
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
-    let regressions = regressions(&techniques, &cases, &differences);
-    Comparison { matched: pairs.len(), techniques, cases, differences, unmatched: unmatched(a, b), regressions }
+    let regressions = regressions(floors.iter().chain(&techniques).chain(&cases), &differences);
+    Comparison {
+        matched: pairs.len(),
+        over_floor,
+        floors,
+        techniques,
+        cases,
+        differences,
+        unmatched: unmatched(a, b),
+        regressions,
+    }
 }
 
-/// The median frame times of a case's rounds.
-fn times(case: &CaseResult) -> Vec<f64> {
-    case.rounds.iter().map(|round| round.frame_ms.p50).collect()
+/// What a round says of a case.
+type Cost = fn(&Times) -> f64;
+
+fn has_floor(round: &Times) -> bool {
+    round.floor_ms.is_some()
+}
+
+fn frame_ms(round: &Times) -> f64 {
+    round.frame_ms.p50
+}
+
+fn floor_ms(round: &Times) -> f64 {
+    round.floor_ms.map_or(f64::NAN, |floor| floor.p50)
+}
+
+fn frame_over_floor(round: &Times) -> f64 {
+    frame_ms(round) / floor_ms(round)
+}
+
+impl Change {
+    /// From the values of both; one of a family of so many tests.
+    fn new(what: String, [a, b]: &[Vec<f64>; 2], family: usize, allowed: f64) -> Self {
+        let ratio = Estimate::ratio(a, b, ALARM / family as f64);
+        Self { what, ratio, is_regression: ratio.low > 1.0 + allowed }
+    }
 }
 
 type Pairs<'a> = Vec<(&'a CaseResult, &'a CaseResult)>;
@@ -101,15 +142,15 @@ fn by_technique<'a>(pairs: &Pairs<'a>) -> BTreeMap<String, Pairs<'a>> {
     families
 }
 
-/// Round by round, the trimmed mean over the cases of the time relative to the middle of the case's times in both runs.
-fn pooled(pairs: &Pairs) -> [Vec<f64>; 2] {
+/// Round by round, the trimmed mean over the cases of the cost relative to the middle of the case's costs in both runs.
+fn pooled(pairs: &Pairs, cost: Cost) -> [Vec<f64>; 2] {
     let mut rounds: [BTreeMap<usize, Vec<f64>>; 2] = Default::default();
     for (a, b) in pairs {
         // Half way between the two medians, so that neither run's count of rounds shifts it.
-        let centre = (middle(times(a)) * middle(times(b))).sqrt();
+        let centre = [a, b].map(|case| middle(case.rounds.iter().map(cost))).iter().product::<f64>().sqrt();
         for (side, case) in [a, b].into_iter().enumerate() {
             for round in &case.rounds {
-                rounds[side].entry(round.round).or_default().push(round.frame_ms.p50 / centre);
+                rounds[side].entry(round.round).or_default().push(cost(round) / centre);
             }
         }
     }
@@ -158,12 +199,12 @@ fn unmatched(a: &Results, b: &Results) -> Vec<String> {
     only_a.chain(only_b).collect()
 }
 
-fn regressions(techniques: &[Change], cases: &[Change], differences: &[Difference]) -> Vec<String> {
+fn regressions<'a>(changes: impl Iterator<Item = &'a Change>, differences: &[Difference]) -> Vec<String> {
     let slower = |change: &Change| {
         let Estimate { value, low, high } = change.ratio;
         format!("{}: {value:.3} times slower ({low:.3} to {high:.3})", change.what)
     };
-    let times = techniques.iter().chain(cases).filter(|change| change.is_regression).map(slower);
+    let times = changes.filter(|change| change.is_regression).map(slower);
     let worse = |d: &Difference| format!("{}: {} {} instead of {}", d.case, d.value, d.after, d.before);
     times.chain(differences.iter().filter(|d| d.is_regression).map(worse)).collect()
 }
