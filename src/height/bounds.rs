@@ -183,6 +183,18 @@ impl Bounds {
         self.tiled_square(level, at)
     }
 
+    /// The four squares in a square of the level above: those beyond the field have no land.
+    #[inline]
+    pub fn squares(&self, level: u32, [i, j]: [u32; 2]) -> [Square; 4] {
+        let (side, last) = (self.side(level), self.last);
+        let square = |i: u32, j: u32| {
+            let is_beyond = i * side >= last[0] || j * side >= last[1];
+            if is_beyond { Square::NOTHING } else { self.square(level, [i, j]) }
+        };
+        let (i, j) = (2 * i, 2 * j);
+        [square(i, j), square(i + 1, j), square(i, j + 1), square(i + 1, j + 1)]
+    }
+
     fn tiled_square(&self, level: u32, at: [u32; 2]) -> Square {
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::sight::{Sight, WITHOUT_ERROR};
+use super::sight::{Look, Sight};
 use super::tree::{Node, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
@@ -69,7 +69,7 @@ impl Refinement {
         self.levels.iter_mut().for_each(Vec::clear);
         self.splits.clear();
         self.index.clear();
-        self.root = look(sight, root, Containment::Crossing).map_or(Found::Nothing, |seen| self.descend(sight, seen));
+        self.root = self.descend(sight, root, sight.look(root));
         for level in 1..root.level as usize {
             for k in 0..self.levels[level].len() {
                 let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
@@ -80,15 +80,17 @@ impl Refinement {
     }
 
     /// What a node is that was looked at, and all that is in it.
-    fn descend(&mut self, sight: &Sight, seen: Seen) -> Found {
-        if seen.ratio >= sight.view.band_end || self.splits.len() > self.most {
-            return block(is_in_sight(sight, seen.node, seen.containment));
+    fn descend(&mut self, sight: &Sight, node: Node, look: Look) -> Found {
+        let Some((containment, ratio)) = look else { return Found::Nothing };
+        if containment == Containment::Outside && sight.view.culls != 0 {
+            return Found::Nothing;
         }
-        let k = self.insert(sight, seen.node, seen.ratio, seen.containment);
-        // All four at once: none waits for another.
-        let look = |quadrant| look(sight, seen.node.child(quadrant), seen.containment);
-        for (quadrant, child) in [look(0), look(1), look(2), look(3)].into_iter().enumerate() {
-            let found = child.map_or(Found::Nothing, |child| self.descend(sight, child));
+        if ratio >= sight.view.band_end || self.splits.len() > self.most {
+            return block(is_in_sight(sight, node, containment));
+        }
+        let k = self.insert(sight, node, ratio, containment);
+        for (quadrant, look) in sight.look_in(node, containment).into_iter().enumerate() {
+            let found = self.descend(sight, node.child(quadrant as u32), look);
             self.splits[k as usize].hold(quadrant, found);
         }
         Found::Split(k)
@@ -139,44 +141,45 @@ impl Refinement {
     }
 
     fn is_leaf_in_sight(&self, sight: &Sight, node: Node) -> bool {
-        let Some(square) = sight.tree.square(node) else { return false };
-        is_in_sight(sight, node, sight.containment(&sight.extent(node, square.range)))
-    }
-
-    #[inline]
-    fn is_inside(&self, sight: &Sight, node: Node) -> bool {
-        self.find(sight.tree, node).is_some_and(|k| self.splits[k as usize].is_inside)
+        sight.containment(node).is_some_and(|containment| is_in_sight(sight, node, containment))
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
         self.index.get(&node.id(tree.root())?).copied()
     }
 
-    /// How far the blocks in a split node have gone over into it, below [`ONE`]; `None` if it is not split. Where
-    /// a node sticks out of the field midpoints are none, so there they stay.
+    /// How far the blocks in a node have gone over into it, below [`ONE`]; `None` if it is not split.
     pub fn weight(&self, sight: &Sight, node: Node) -> Option<u32> {
         let k = self.find(sight.tree, node)?;
-        let part = (self.splits[k as usize].ratio - 1.0) * sight.view.band_scale;
-        let stays = sight.view.band_scale == 0.0 || sight.tree.is_partial(node);
-        Some(if stays { 0 } else { part.clamp(0.0, (ONE - 1) as f32) as u32 })
+        Some(self.splits[k as usize].weight(sight))
     }
 
     /// The weight of a side of a split node, the greater of its two nodes': from [`ONE`] on the other one is not
     /// split, and `ONE` stands for its own level. Where nothing is drawn beyond, the node's own.
-    pub fn side_weight(&self, sight: &Sight, node: Node, side: usize) -> u32 {
-        let own = self.weight(sight, node).unwrap_or(0);
-        let Some(beyond) = node.beyond(side) else { return own };
+    pub fn side_weight(&self, sight: &Sight, split: &Split, side: usize) -> u32 {
+        let own = split.weight(sight);
+        let Some(beyond) = split.node.beyond(side) else { return own };
         match self.weight(sight, beyond) {
             Some(weight) => own.max(weight),
             // Where all of a node is in sight, so is the side that the other one shares with it.
             None if sight.tree.square(beyond).is_none() => own,
-            None if !self.is_inside(sight, node) && !sight.draws(beyond) => own,
+            None if !split.is_inside && !sight.draws(beyond) => own,
+            None if sight.view.band_scale == 0.0 => ONE,
             None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
         }
     }
 }
 
 impl Split {
+    /// How far its blocks have gone over into it, below [`ONE`]. Where a node sticks out of the field midpoints are
+    /// none, so there they stay.
+    pub fn weight(&self, sight: &Sight) -> u32 {
+        if sight.view.band_scale == 0.0 || sight.tree.is_partial(self.node) {
+            return 0;
+        }
+        ((self.ratio - 1.0) * sight.view.band_scale).clamp(0.0, (ONE - 1) as f32) as u32
+    }
+
     fn hold(&mut self, quadrant: usize, found: Found) {
         self.blocks &= !(1 << quadrant);
         match found {
@@ -185,27 +188,6 @@ impl Split {
             Found::Split(place) => self.children[quadrant] = Some(place),
         }
     }
-}
-
-/// A node, how it lies to what can be seen, and what the tolerance allows over its ε.
-struct Seen {
-    node: Node,
-    containment: Containment,
-    ratio: f32,
-}
-
-/// Looks at a node in one that lies to what can be seen as `around` says. `None`: nothing of it is drawn.
-#[inline]
-fn look(sight: &Sight, node: Node, around: Containment) -> Option<Seen> {
-    let square = sight.tree.square(node)?;
-    let extent = sight.extent(node, square.range);
-    // What is in a node lies no other way than that, if it is not crossed by a plane.
-    let containment = if around == Containment::Crossing { sight.containment(&extent) } else { around };
-    if containment == Containment::Outside && sight.view.culls != 0 {
-        return None;
-    }
-    let ratio = if node.level > 0 { sight.ratio(&extent, square.error) } else { WITHOUT_ERROR };
-    Some(Seen { node, containment, ratio })
 }
 
 fn block(is_seen: bool) -> Found {
@@ -220,12 +202,9 @@ fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
         Containment::Inside => true,
         Containment::Crossing => {
             node.level == 0
-                || (0..4).any(|quadrant| {
-                    let child = node.child(quadrant);
-                    sight.tree.square(child).is_some_and(|square| {
-                        is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
-                    })
-                })
+                || (0u32..)
+                    .zip(sight.contained_in(node))
+                    .any(|(quadrant, containment)| is_in_sight(sight, node.child(quadrant), containment))
         }
     }
 }
