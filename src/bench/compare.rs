@@ -1,26 +1,25 @@
 //! What changed from one benchmark to another: times as ratios with intervals, counts and errors exactly.
 //!
-//! A case's time is taken over the floor's of the same frames, drawn in turn with them: what slows the whole machine
-//! down slows both. The floors are compared by themselves, as they tell of shading or of the machine.
+//! Frames are held against each other as [`slowdown`] has it, over their floors: those tell how fast the machine was, and
+//! are compared by themselves, as they tell of shading too.
 //!
-//! The cases of a technique are tested together, as they tell much smaller changes from noise than one case with its
-//! handful of rounds: round by round the mean over the cases of the time relative to the case's own middle, without the
-//! extreme fifths. That is a regression if the whole interval lies above 1 + threshold. A single case, or all floors
-//! together, are one if the whole interval lies above 1 + twice the threshold. Many things are tested at once, so tails
-//! are divided among the techniques and among the cases (Bonferroni): the chance of any false alarm among them stays
-//! below 5 % even if the truth is the threshold itself.
+//! All cases of a technique are tested together: that is a regression if the whole interval lies above 1 + threshold.
+//! A single case, or all floors together, are one if it lies above 1 + twice the threshold. Many things are tested at
+//! once, so tails are divided among the techniques and among the cases (Bonferroni). With fewer than [`LEAST_ROUNDS`]
+//! rounds in either run no time is judged.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::results::{CaseResult, Results};
-use super::rows::{Errors, Times};
-use super::statistics::{Estimate, middle, trimmed_mean};
+use super::rows::Errors;
+use super::slowdown::{Cost, LEAST_ROUNDS, Pair, has_floors, slowdown};
+use super::statistics::Estimate;
 
 /// What is no regression yet: a tenth.
 pub const THRESHOLD: f64 = 0.1;
-/// Chance of any false alarm.
+/// Share of intervals that may miss the truth, all of a kind together.
 const ALARM: f64 = 0.05;
 
 /// What changed.
@@ -28,6 +27,8 @@ const ALARM: f64 = 0.05;
 pub struct Comparison {
     /// Cases that both have.
     pub matched: usize,
+    /// Whether both runs have rounds enough to judge times by.
+    pub is_judged: bool,
     /// Whether times are over the floor's; milliseconds where one of the two has no floors.
     pub over_floor: bool,
     /// Times of the floors, all cases together.
@@ -75,86 +76,35 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
     let timed: Vec<_> = pairs.iter().copied().filter(|(a, b)| a.time.is_some() && b.time.is_some()).collect();
-    let over_floor = timed.iter().all(|(a, b)| [a, b].iter().all(|case| case.rounds.iter().all(has_floor)));
-    let cost = if over_floor { frame_over_floor } else { frame_ms };
-    let cases: Vec<_> = timed
-        .iter()
-        .map(|(a, b)| {
-            let costs = [a, b].map(|case| case.rounds.iter().map(cost).collect());
-            Change::new(a.case.to_string(), &costs, timed.len(), 2.0 * threshold)
-        })
-        .collect();
-    let together = |name: &str, pairs: &Pairs, cost: Cost, family: usize, allowed: f64| {
-        Change::new(format!("{name}, {} cases", pairs.len()), &pooled(pairs, cost), family, allowed)
+    let is_judged = timed.iter().all(|(a, b)| a.rounds.len().min(b.rounds.len()) >= LEAST_ROUNDS);
+    let over_floor = timed.iter().all(|(a, b)| has_floors(a) && has_floors(b));
+    let change = |what: String, pairs: &[Pair], cost: Cost, family: usize, allowed: f64| {
+        let ratio = slowdown(pairs, cost, ALARM / family as f64);
+        Change { what, ratio, is_regression: is_judged && ratio.low > 1.0 + allowed }
     };
+    let cost = if over_floor { Cost::OverFloor } else { Cost::Frame };
+    let of_case = |pair: &Pair| change(pair.0.case.to_string(), &[*pair], cost, timed.len(), 2.0 * threshold);
+    let cases: Vec<_> = timed.iter().map(of_case).collect();
     let families = by_technique(&timed);
-    let techniques: Vec<_> =
-        families.iter().map(|(name, pairs)| together(name, pairs, cost, families.len(), threshold)).collect();
-    let floors = (over_floor && !timed.is_empty()).then(|| together("floor", &timed, floor_ms, 1, 2.0 * threshold));
+    let together = |name: &str, pairs: &[Pair]| format!("{name}, {} cases", pairs.len());
+    let of_technique =
+        |(name, pairs): (&String, &Vec<Pair>)| change(together(name, pairs), pairs, cost, families.len(), threshold);
+    let techniques: Vec<_> = families.iter().map(of_technique).collect();
+    let has_floors = over_floor && !timed.is_empty();
+    let floors = has_floors.then(|| change(together("floor", &timed), &timed, Cost::Floor, 1, 2.0 * threshold));
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
     let regressions = regressions(floors.iter().chain(&techniques).chain(&cases), &differences);
-    Comparison {
-        matched: pairs.len(),
-        over_floor,
-        floors,
-        techniques,
-        cases,
-        differences,
-        unmatched: unmatched(a, b),
-        regressions,
-    }
+    let matched = pairs.len();
+    let unmatched = unmatched(a, b);
+    Comparison { matched, is_judged, over_floor, floors, techniques, cases, differences, unmatched, regressions }
 }
 
-/// What a round says of a case.
-type Cost = fn(&Times) -> f64;
-
-fn has_floor(round: &Times) -> bool {
-    round.floor_ms.is_some()
-}
-
-fn frame_ms(round: &Times) -> f64 {
-    round.frame_ms.p50
-}
-
-fn floor_ms(round: &Times) -> f64 {
-    round.floor_ms.map_or(f64::NAN, |floor| floor.p50)
-}
-
-fn frame_over_floor(round: &Times) -> f64 {
-    frame_ms(round) / floor_ms(round)
-}
-
-impl Change {
-    /// From the values of both; one of a family of so many tests.
-    fn new(what: String, [a, b]: &[Vec<f64>; 2], family: usize, allowed: f64) -> Self {
-        let ratio = Estimate::ratio(a, b, ALARM / family as f64);
-        Self { what, ratio, is_regression: ratio.low > 1.0 + allowed }
-    }
-}
-
-type Pairs<'a> = Vec<(&'a CaseResult, &'a CaseResult)>;
-
-fn by_technique<'a>(pairs: &Pairs<'a>) -> BTreeMap<String, Pairs<'a>> {
-    let mut families: BTreeMap<String, Pairs> = BTreeMap::new();
+fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
+    let mut families: BTreeMap<String, Vec<Pair>> = BTreeMap::new();
     for &(a, b) in pairs {
         families.entry(a.case.series()).or_default().push((a, b));
     }
     families
-}
-
-/// Round by round, the trimmed mean over the cases of the cost relative to the middle of the case's costs in both runs.
-fn pooled(pairs: &Pairs, cost: Cost) -> [Vec<f64>; 2] {
-    let mut rounds: [BTreeMap<usize, Vec<f64>>; 2] = Default::default();
-    for (a, b) in pairs {
-        // Half way between the two medians, so that neither run's count of rounds shifts it.
-        let centre = [a, b].map(|case| middle(case.rounds.iter().map(cost))).iter().product::<f64>().sqrt();
-        for (side, case) in [a, b].into_iter().enumerate() {
-            for round in &case.rounds {
-                rounds[side].entry(round.round).or_default().push(cost(round) / centre);
-            }
-        }
-    }
-    rounds.map(|rounds| rounds.into_values().map(trimmed_mean).collect())
 }
 
 /// A value of the errors, and whether any growth of it breaks a promise.

@@ -65,6 +65,7 @@ const ERRORS: &[Column] = &[
     ("frames within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.frames))),
     ("samples within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.samples))),
     ("pop p99, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p99_px))),
+    ("pop 99.9 %, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p999_px))),
     ("FLIP", |r| r.errors.as_ref()?.image.map(|i| number(i.flip))),
     ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
     ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),

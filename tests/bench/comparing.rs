@@ -47,7 +47,7 @@ fn run(random: &mut fastrand::Rng, machine: Option<f64>, slower: impl Fn(&Case) 
 
 #[test]
 fn ten_repeats_of_the_same_run_raise_no_alarm() {
-    for seed in 0..20 {
+    for seed in 0..8 {
         let mut random = fastrand::Rng::with_seed(seed);
         let first = simulated(&mut random, |_| 1.0);
         for repeat in 0..10 {
@@ -62,7 +62,7 @@ fn ten_repeats_of_the_same_run_raise_no_alarm() {
 #[test]
 fn a_fifth_slower_is_found_and_found_where_it_is() {
     let mut found = 0;
-    for seed in 0..100 {
+    for seed in 0..40 {
         let mut random = fastrand::Rng::with_seed(1000 + seed);
         let before = simulated(&mut random, |_| 1.0);
         let slower = |case: &Case| if case.series() == "geomipmap" { 1.2 } else { 1.0 };
@@ -74,12 +74,12 @@ fn a_fifth_slower_is_found_and_found_where_it_is() {
         assert!(!of("brute-force").is_regression && !of("geomipmap (paper").is_regression, "seed {seed}");
         assert!(comparison.regressions.iter().all(|what| !what.contains("brute-force")), "seed {seed}");
     }
-    assert!(found >= 90, "found {found} times of 100");
+    assert!(found >= 38, "found {found} times of 40");
 }
 
 #[test]
 fn a_slower_machine_hides_nothing_and_raises_no_alarm_but_for_the_floor() {
-    for seed in 0..50 {
+    for seed in 0..15 {
         let mut random = fastrand::Rng::with_seed(2000 + seed);
         let before = run(&mut random, Some(1.0), |_| 1.0);
         let comparison = compare(&before, &run(&mut random, Some(1.15), |_| 1.0), THRESHOLD);
