@@ -1,7 +1,8 @@
 //! How long each technique takes to select what is drawn, without a device:
 //! `cargo bench --no-default-features -- FILE [technique[:variant] …]`.
 //!
-//! Every frame of a path is selected once to warm up and then several times, all techniques in turn.
+//! Every frame of a path is selected once to warm up and then several times. In between other memory is read, as a frame
+//! is drawn in between: caches are cold.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +18,9 @@ use cuesta::view::{Metric, Tolerance, View};
 /// Frames of a path.
 const FRAMES: usize = 48;
 /// How often each frame is selected and timed.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 5;
+/// Bytes read between two selections: more than caches hold.
+const CACHES: usize = 64 << 20;
 /// Where it is flown.
 const PATHS: [&str; 2] = ["circle", "skim"];
 
@@ -49,10 +52,12 @@ fn technique(field: &Arc<Field>, name: &str) -> Box<dyn Technique> {
 
 fn measure(what: &str, technique: &mut dyn Technique, views: &[View]) {
     let mut list = DrawList::default();
+    let other = vec![1u8; CACHES];
     let mut times_us = Vec::new();
     let (mut triangles, mut instances) = (0, 0);
     for round in 0..=ROUNDS {
         for view in views {
+            std::hint::black_box(other.iter().step_by(64).map(|&byte| u64::from(byte)).sum::<u64>());
             let start = Instant::now();
             list.clear();
             technique.select(view, &mut list);

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::sight::{Look, Sight};
-use super::tree::{Node, Tree};
+use super::tree::{Node, Squares, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
 
@@ -24,8 +24,8 @@ pub struct Split {
     pub node: Node,
     /// What the tolerance allows over its ε.
     ratio: f32,
-    /// Whether all of it is in sight for certain.
-    is_inside: bool,
+    /// How it lies to what can be seen.
+    containment: Containment,
     /// Which of its children are blocks in sight, a bit each.
     pub blocks: u32,
     /// Those of its children that are split, by their place among the split nodes.
@@ -52,6 +52,8 @@ pub struct Refinement {
     /// Their places by level.
     levels: Vec<Vec<u32>>,
     index: HashMap<u64, u32, BuildHasherDefault<NodeHasher>>,
+    /// What is known of the children of a level's split nodes.
+    squares: Vec<Squares>,
     /// What the root is.
     pub root: Found,
 }
@@ -59,7 +61,8 @@ pub struct Refinement {
 impl Refinement {
     /// With at most `most` split nodes.
     pub fn new(most: usize) -> Self {
-        Self { most, splits: Vec::new(), levels: Vec::new(), index: HashMap::default(), root: Found::Nothing }
+        let (splits, levels, index, squares) = (Vec::new(), Vec::new(), HashMap::default(), Vec::new());
+        Self { most, splits, levels, index, squares, root: Found::Nothing }
     }
 
     /// Finds the split nodes of a view. `false` if there would be too many.
@@ -69,7 +72,7 @@ impl Refinement {
         self.levels.iter_mut().for_each(Vec::clear);
         self.splits.clear();
         self.index.clear();
-        self.root = self.descend(sight, root, sight.look(root));
+        self.descend(sight);
         for level in 1..root.level as usize {
             for k in 0..self.levels[level].len() {
                 let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
@@ -79,8 +82,31 @@ impl Refinement {
         self.splits.len() <= self.most
     }
 
-    /// What a node is that was looked at, and all that is in it.
-    fn descend(&mut self, sight: &Sight, node: Node, look: Look) -> Found {
+    /// Splits what has to be, level by level.
+    fn descend(&mut self, sight: &Sight) {
+        let root = sight.tree.root();
+        self.root = self.found(sight, root, sight.look(root));
+        for level in (1..=root.level as usize).rev() {
+            // All of a level before any is looked at: what is far away in memory comes at the same time.
+            self.squares.clear();
+            let nodes = self.levels[level].iter().map(|&k| self.splits[k as usize].node);
+            self.squares.extend(nodes.map(|node| sight.tree.squares(node)));
+            for n in 0..self.levels[level].len() {
+                self.look_into(sight, self.levels[level][n], self.squares[n]);
+            }
+        }
+    }
+
+    fn look_into(&mut self, sight: &Sight, k: u32, squares: Squares) {
+        let Split { node, containment, .. } = self.splits[k as usize];
+        for (quadrant, look) in sight.look_in(node, containment, &squares).into_iter().enumerate() {
+            let found = self.found(sight, node.child(quadrant as u32), look);
+            self.splits[k as usize].hold(quadrant, found);
+        }
+    }
+
+    /// What a node is that was looked at.
+    fn found(&mut self, sight: &Sight, node: Node, look: Look) -> Found {
         let Some((containment, ratio)) = look else { return Found::Nothing };
         if containment == Containment::Outside && sight.view.culls != 0 {
             return Found::Nothing;
@@ -88,12 +114,7 @@ impl Refinement {
         if ratio >= sight.view.band_end || self.splits.len() > self.most {
             return block(is_in_sight(sight, node, containment));
         }
-        let k = self.insert(sight, node, ratio, containment);
-        for (quadrant, look) in sight.look_in(node, containment).into_iter().enumerate() {
-            let found = self.descend(sight, node.child(quadrant as u32), look);
-            self.splits[k as usize].hold(quadrant, found);
-        }
-        Found::Split(k)
+        Found::Split(self.insert(sight, node, ratio, containment))
     }
 
     fn insert(&mut self, sight: &Sight, node: Node, ratio: f32, containment: Containment) -> u32 {
@@ -102,8 +123,7 @@ impl Refinement {
             self.index.insert(id, k);
         }
         self.levels[node.level as usize].push(k);
-        let is_inside = containment == Containment::Inside;
-        self.splits.push(Split { node, ratio, is_inside, blocks: 0, children: [None; 4] });
+        self.splits.push(Split { node, ratio, containment, blocks: 0, children: [None; 4] });
         k
     }
 
@@ -163,7 +183,7 @@ impl Refinement {
             Some(weight) => own.max(weight),
             // Where all of a node is in sight, so is the side that the other one shares with it.
             None if sight.tree.square(beyond).is_none() => own,
-            None if !split.is_inside && !sight.draws(beyond) => own,
+            None if split.containment != Containment::Inside && !sight.draws(beyond) => own,
             None if sight.view.band_scale == 0.0 => ONE,
             None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
         }

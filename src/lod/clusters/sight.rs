@@ -94,11 +94,10 @@ impl<'a> Sight<'a> {
         Some((self.contained(&extent)[0], ratio))
     }
 
-    /// The children of a node that lies to what can be seen as `around` says.
+    /// The children of a node that lies to what can be seen as `around` says: `squares` is what is known of them.
     #[inline]
-    pub fn look_in(&self, node: Node, around: Containment) -> [Look; 4] {
-        let squares = self.tree.squares(node);
-        let extents = self.children(node, &squares);
+    pub fn look_in(&self, node: Node, around: Containment, squares: &Squares) -> [Look; 4] {
+        let extents = self.children(node, squares);
         // What is in a node lies no other way than that, if it is not crossed by a plane.
         let contained = if around == Containment::Crossing { self.contained(&extents) } else { [around; 4] };
         let finest = node.level == 1;
@@ -276,6 +275,7 @@ mod tests {
 
     use super::*;
     use crate::height::bounds::Measure;
+    use crate::height::progress::Progress;
     use crate::height::{Field, Holes, Samples};
     use crate::view::{Aabb, Tolerance};
 
@@ -292,7 +292,7 @@ mod tests {
             let mut field = Field::new(Samples::F32(heights(seed)), [64, 64], spacing, Holes::none(64 * 64));
             field.origin = origin;
             let measure = Measure { cells: 8, growth: 1.0, errors: true, morph: false };
-            Tree::new(&Arc::new(field.tiled(tiles)), measure, false)
+            Tree::new(&Arc::new(field.tiled(tiles)), measure, false, &Progress::default())
         };
         vec![
             tree([1, 1], [1.0, 1.0], [0.0, 0.0]),
@@ -387,7 +387,11 @@ mod tests {
                     continue;
                 }
                 let alone = [0, 1, 2, 3].map(|quadrant| sight.look(node.child(quadrant)));
-                assert_eq!(sight.look_in(node, Containment::Crossing), alone, "{node:?}, {view:?}");
+                assert_eq!(
+                    sight.look_in(node, Containment::Crossing, &tree.squares(node)),
+                    alone,
+                    "{node:?}, {view:?}"
+                );
                 let outside = Containment::Outside;
                 assert_eq!(sight.contained_in(node), alone.map(|look| look.map_or(outside, |(found, _)| found)));
                 alone.iter().flatten().for_each(|(found, _)| seen[*found as usize] += 1);

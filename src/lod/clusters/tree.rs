@@ -6,6 +6,7 @@ use glam::Vec4;
 
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure, Square};
+use crate::height::progress::Progress;
 
 /// A square of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,8 +101,8 @@ pub struct Tree {
 
 impl Tree {
     /// Measures a field for blocks of `measure.cells` × `measure.cells` cells.
-    pub fn new(field: &Arc<Field>, measure: Measure, halved: bool) -> Self {
-        let bounds = Bounds::new(field, measure);
+    pub fn new(field: &Arc<Field>, measure: Measure, halved: bool, progress: &Progress) -> Self {
+        let bounds = Bounds::new(field, measure, progress);
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
         let errors = if halved { Errors::Halved((high - low).max(0.0)) } else { Errors::Measured };
         let last = field.size().map(|n| n - 1);
