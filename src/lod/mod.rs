@@ -6,6 +6,7 @@ pub mod brute_force;
 pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
+pub mod sorted_strips;
 
 use std::sync::Arc;
 
@@ -97,7 +98,7 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY];
+pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, sorted_strips::ENTRY, clusters::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

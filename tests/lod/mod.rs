@@ -3,6 +3,8 @@
 mod clusters;
 mod morph;
 mod skirts;
+mod strips;
+mod strips_order;
 
 use std::sync::Arc;
 
