@@ -7,7 +7,7 @@
 //!
 //! What is rounded errs on the safe side. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves and a sum
 //! along a direction by 12 u of its terms, which [`SLACK`] covers. The ratio is at most 80 u and twice what
-//! [`inverse_root`] lacks above the true one, less than 2⁻¹⁶: [`GUARD`] takes four times that off.
+//! [`inverse_roots`] lacks above the true one, less than 2⁻¹⁶: [`GUARD`] takes four times that off.
 //!
 //! A node in another is in sight only if that is, rounding included: every step is monotone in the node's corners.
 //!
