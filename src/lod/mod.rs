@@ -10,7 +10,7 @@ pub mod sorted_strips;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Seams, Submission};
+use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Morph, Seams, Submission};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -54,10 +54,9 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
-    /// Whether its instances have weights ([`weights`](crate::draw::weights)): its lattice vertices morph, or fall
-    /// onto coarser sides.
-    fn morphs(&self) -> bool {
-        false
+    /// How its lattice vertices move.
+    fn morph(&self) -> Morph {
+        Morph::No
     }
 
     /// How its meshes meet: which of the two proofs its lists pass ([`watertight`](crate::measure::watertight)).

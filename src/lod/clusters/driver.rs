@@ -11,6 +11,7 @@
 use super::mesh::Mesh;
 use super::states::Seeds;
 use super::tree::{Errors, Tree};
+use super::ways::WAYS;
 use crate::draw::Seams;
 use crate::draw::driver::{Driver, Groups, Step};
 use crate::draw::layout::{ClusterScratch, ClusterTree, ClusterView};
@@ -52,14 +53,7 @@ impl Room {
 }
 
 /// The selection of clusters of a quadtree, at most `most` nodes of it split. `None` if no device need be able to.
-pub fn driver(
-    tree: &Tree,
-    cells: u32,
-    seams: Seams,
-    seeds: &Seeds,
-    mesh: &Mesh,
-    most: usize,
-) -> Option<Driver> {
+pub fn driver(tree: &Tree, cells: u32, seams: Seams, seeds: &Seeds, mesh: &Mesh, most: usize) -> Option<Driver> {
     let root = tree.root().level;
     if root >= MOST_LEVELS {
         return None;
@@ -72,10 +66,10 @@ pub fn driver(
         cells,
         root,
         cuts: u32::from(tree.bounds.has_errors()),
-        skirts: match (seams, tree.errors) {
+        skirts: match (seams, &tree.errors) {
             (Seams::Shared, _) => 0,
-            (Seams::Skirts, Errors::Measured) => 1,
             (Seams::Skirts, Errors::Halved(_)) => 2,
+            (Seams::Skirts, _) => 1,
         },
         most: most as u32,
         places: places as u32,
@@ -93,7 +87,7 @@ pub fn driver(
     let driver = Driver {
         programs: PROGRAMS,
         table,
-        parameters: size_of::<ClusterView>() / 4,
+        parameters: size_of::<ClusterView>() / 4 + WAYS,
         scratch: HEAD + room.0 as usize,
         steps: steps(&head),
         draws: mesh.ranges.len(),
