@@ -20,7 +20,7 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
-    let queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+    let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
         // Any bytes are weights; quadrants of level 0 cannot be finer than it.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
