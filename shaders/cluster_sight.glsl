@@ -68,7 +68,7 @@ Square held_square(uint at) {
 
 // height/bounds.rs, Bounds::square.
 Square measured(Node node) {
-    uint level = tree.levels + 4 * node.level;
+    uint level = tree.levels + 5 * node.level;
     uint held = words[level];
     uvec2 count = uvec2(words[level + 1], words[level + 2]);
     if (tree.period == uvec2(0)) return held_square(held + 3 * (node.at.y * count.x + node.at.x));
@@ -82,9 +82,9 @@ Square measured(Node node) {
             all = Square(max(all.error, one.error), vec2(min(all.range.x, one.range.x), max(all.range.y, one.range.y)));
         }
     }
-    if (tree.cuts != 0 && all.range.x <= all.range.y && is_partial(node)) {
+    if (all.range.x <= all.range.y && is_partial(node)) {
         precise float height = all.range.y - all.range.x;
-        all.error = max(all.error, height);
+        all.error = max(all.error, min(uintBitsToFloat(words[level + 4]), height));
     }
     return all;
 }

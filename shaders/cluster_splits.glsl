@@ -64,7 +64,7 @@ void enter(Node node, float ratio) {
                 atomicMax(scratch.groups.x, k / 64 + 1);
                 uint level_row = row(node.level);
                 uint n = atomicAdd(work[level_row + COUNT], 1);
-                work[words[tree.levels + 4 * node.level + 3] + n] = place;
+                work[words[tree.levels + 5 * node.level + 3] + n] = place;
                 atomicMax(work[level_row + CHILDREN], n / 16 + 1);
                 atomicMax(work[level_row + NODES], n / 64 + 1);
             }
@@ -83,7 +83,7 @@ bool draws(Node node) {
 
 // The k-th split node of a level: its place.
 uint place_in_level(uint level, uint k) {
-    return work[words[tree.levels + 4 * level + 3] + k];
+    return work[words[tree.levels + 5 * level + 3] + k];
 }
 
 Node node_at(uint place) {

@@ -215,8 +215,6 @@ shared! {
         cells: uint,
         /// Level of the root.
         root: uint,
-        /// Whether squares that the end of a tiled field cuts have their whole range as error.
-        cuts: uint,
         /// Whether blocks have skirts, and whether their errors are their squares': 0: no skirts; 1: they are; 2: they
         /// are not.
         skirts: uint,
@@ -224,8 +222,8 @@ shared! {
         most: uint,
         /// Places in the table of split nodes: a power of two.
         places: uint,
-        /// Where the levels are: for each the offset of its squares, how many there are (x, z), and the offset of
-        /// its split nodes in `ClusterScratch`'s words.
+        /// Where the levels are: for each the offset of its squares, how many there are (x, z), the offset of its split
+        /// nodes in `ClusterScratch`'s words, and the error of what the end of a tiled field cuts.
         levels: uint,
         /// Where seed and turns of each state are.
         states: uint,

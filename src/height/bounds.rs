@@ -8,11 +8,10 @@
 
 use rayon::prelude::*;
 
-use super::Field;
 use super::kept::Kept;
 use super::levels::{self, Patch};
 use super::progress::Progress;
-use super::surface;
+use super::{Field, cuts, surface};
 
 /// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
 /// the two steps of `draw::place::lattice_height`.
@@ -52,6 +51,8 @@ pub struct Bounds {
     last: [u32; 2],
     period: [Option<u32>; 2],
     levels: Vec<Level>,
+    /// By level, the error of cells that the end of a tiled field cuts; none where errors are not measured.
+    cuts: Vec<f32>,
 }
 
 /// The squares of one level: those of a tiled axis begin at every multiple of the side within the period.
@@ -90,8 +91,9 @@ impl Bounds {
     pub fn new(field: &Field, measure: Measure, progress: &Progress) -> Self {
         let (stored, size) = (field.stored(), field.size());
         let period = [0, 1].map(|k| (size[k] > stored[k]).then_some(stored[k]));
-        let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new() };
+        let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new(), cuts: Vec::new() };
         bounds.lay_out(size[0].max(size[1]) - 1);
+        bounds.cuts.resize(bounds.levels.len(), 0.0);
         let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
         let kept = is_large.then(|| Kept::new(field, &measure.name())).flatten();
         if kept.as_ref().and_then(Kept::read).is_some_and(|content| bounds.fill(&content)) {
@@ -100,6 +102,9 @@ impl Bounds {
         // A level takes about as long as another: all its squares look at all samples.
         progress.expect(bounds.levels.iter().map(|level| level.samples()).sum());
         (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level, progress));
+        if measure.errors {
+            bounds.cuts = cuts::errors(field, measure, bounds.levels());
+        }
         kept.inspect(|kept| kept.write(&bounds.content()));
         bounds
     }
@@ -117,14 +122,15 @@ impl Bounds {
         }
     }
 
-    /// All squares, level by level.
+    /// All squares, level by level, and what is cut.
     fn content(&self) -> Vec<u8> {
-        self.levels.iter().flat_map(|level| bytemuck::cast_slice::<_, u8>(&level.squares).iter().copied()).collect()
+        let squares = self.levels.iter().flat_map(|level| bytemuck::cast_slice::<_, u8>(&level.squares));
+        squares.chain(bytemuck::cast_slice(&self.cuts)).copied().collect()
     }
 
-    /// Takes all squares from what [`Self::content`] made; `false` if that was another layout.
+    /// Takes all from what [`Self::content`] made; `false` if that was another layout.
     fn fill(&mut self, content: &[u8]) -> bool {
-        if content.len() != self.bytes() {
+        if content.len() != self.bytes() + size_of_val(self.cuts.as_slice()) {
             return false;
         }
         let mut rest = content;
@@ -133,6 +139,7 @@ impl Bounds {
             bytemuck::cast_slice_mut(&mut level.squares).copy_from_slice(own);
             rest = after;
         }
+        bytemuck::cast_slice_mut(&mut self.cuts).copy_from_slice(rest);
         true
     }
 
@@ -154,9 +161,10 @@ impl Bounds {
         self.period
     }
 
-    /// Whether errors were measured.
-    pub fn has_errors(&self) -> bool {
-        self.measure.errors
+    /// The error, metres, of the cells of a level that the end of a tiled field cuts, at most what samples in them are
+    /// apart: that alone counts where it is infinite.
+    pub fn cut(&self, level: u32) -> f32 {
+        self.cuts[level as usize]
     }
 
     /// Bytes held.
@@ -201,9 +209,12 @@ impl Bounds {
     fn tiled_square(&self, level: u32, at: [u32; 2]) -> Square {
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);
+        if !square.has_land() || !self.is_partial(level, at) {
+            return square;
+        }
         // The end of a tiled field cuts squares that are measured whole.
-        let cut = self.measure.errors && square.has_land() && self.is_partial(level, at);
-        if cut { Square { error: square.error.max(square.range[1] - square.range[0]), ..square } } else { square }
+        let [low, high] = square.range;
+        Square { error: square.error.max(self.cut(level).min(high - low)), ..square }
     }
 
     /// What holds for all squares of a level that a rectangle of samples touches.
@@ -445,12 +456,12 @@ mod tests {
 
     #[test]
     fn what_is_known_of_a_tiled_field_holds_in_every_tile() {
-        for (size, tiles) in [([41, 30], [3, 4]), ([32, 64], [3, 2]), ([33, 57], [4, 1]), ([16, 16], [9, 9])] {
+        let fields =
+            [([41, 30], [3, 4]), ([32, 64], [3, 2]), ([33, 57], [4, 1]), ([16, 16], [9, 9]), ([64, 64], [3, 3])];
+        let morphing = Measure { morph: true, growth: 1.3, ..MEASURE };
+        for ((size, tiles), measure) in fields.into_iter().flat_map(|field| [MEASURE, morphing].map(|m| (field, m))) {
             let field = rough(size, 9).tiled(tiles);
-            let (tiled, whole) = (
-                Bounds::new(&field, MEASURE, &Progress::default()),
-                Bounds::new(&held(&field), MEASURE, &Progress::default()),
-            );
+            let [tiled, whole] = [&field, &held(&field)].map(|field| Bounds::new(field, measure, &Progress::default()));
             assert!(tiled.bytes() < whole.bytes());
             for (level, at) in squares(&whole) {
                 let (general, exact) = (tiled.square(level, at), whole.square(level, at));
@@ -459,6 +470,11 @@ mod tests {
                 assert!(general.range[0] <= exact.range[0] && general.range[1] >= exact.range[1], "{what}");
                 let aligned = size.iter().all(|n| n.is_multiple_of(8 << level)) && !whole.is_partial(level, at);
                 assert!(!aligned || general == exact, "{what}");
+                // What is cut is known, too: no worse than the worst of the level.
+                let of_level = || squares(&whole).into_iter().filter(|(other, _)| *other == level);
+                let worst = || of_level().map(|(_, at)| whole.square(level, at).error).fold(0.0, f32::max);
+                let is_known = tiled.is_partial(level, at) && tiled.cut(level).is_finite();
+                assert!(!is_known || general.error <= 1.5 * worst(), "{what}");
             }
         }
     }

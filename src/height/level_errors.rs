@@ -3,16 +3,15 @@
 use rayon::prelude::*;
 
 use super::Field;
-use super::bounds::{Bounds, is_aligned};
-use super::levels::{self, Patch};
+use super::bounds::Bounds;
+use super::levels;
 
-/// The largest error, metres, of any square of each level ([`Bounds`]), those that the end of a tiled field cuts
-/// included.
-pub fn largest_errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
+/// The largest error, metres, of any square of each level, those that the end of a tiled field cuts included.
+pub fn largest_errors(bounds: &Bounds) -> Vec<f32> {
+    let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
     let of_level = |level: u32| {
         let (_, squares) = bounds.held(level);
-        let whole = squares.iter().map(|square| square.error).fold(0.0, f32::max);
-        if level == 0 { whole } else { whole.max(cut_error(field, bounds, level)) }
+        squares.iter().map(|square| square.error).fold(bounds.cut(level).min(high - low), f32::max)
     };
     (0..bounds.levels()).map(of_level).collect()
 }
@@ -53,34 +52,6 @@ fn bend(field: &Field, vertex: [u32; 2], half: u32, last: [u32; 2]) -> Option<f3
     Some((middle - ends).abs())
 }
 
-/// The largest error of the cells of a level that the end of a tiled axis cuts, their sides on or off the next level.
-fn cut_error(field: &Field, bounds: &Bounds, level: u32) -> f32 {
-    let (period, last, pair) = (bounds.period(), field.size().map(|n| n - 1), 2u32 << level);
-    let of_axis = |axis: usize| {
-        if period[axis].is_none() || last[axis].is_multiple_of(pair) {
-            return 0.0;
-        }
-        let (across, side) = (1 - axis, bounds.side(level));
-        if let Some(length) = period[across]
-            && !is_aligned(length, level, side)
-        {
-            // They lie anywhere: no more than all samples are apart.
-            let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
-            return high - low;
-        }
-        let once = period[across].unwrap_or(u32::MAX);
-        let starts = (0..last[across].min(once)).step_by(side as usize).chain([last[across] / pair * pair]);
-        let patch = |start: u32| {
-            let (mut first, mut cells) = ([last[axis] / pair * pair; 2], [2; 2]);
-            (first[across], cells[across]) = (start, side.min(once) >> level);
-            let patch = Patch { field, first, cells, level, last };
-            patch.deviation().max(patch.stitched_deviation(1))
-        };
-        starts.map(patch).fold(0.0, f32::max)
-    };
-    of_axis(0).max(of_axis(1))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,7 +76,7 @@ mod tests {
     fn of_a_tiled_field_they_hold_for_the_same_land_without_tiles() {
         for (size, tiles) in [([64, 32], [3, 5]), ([41, 64], [3, 2]), ([128, 128], [2, 2]), ([30, 43], [3, 3])] {
             let tiled = synth::synth(synth::Kind::Fractal, size, 3).tiled(tiles);
-            let of = |field: &Field| (largest_errors(field, &bounds(field)), largest_ways(field, &bounds(field)));
+            let of = |field: &Field| (largest_errors(&bounds(field)), largest_ways(field, &bounds(field)));
             let ((errors, ways), (exact_errors, exact_ways)) = (of(&tiled), of(&held(&tiled)));
             for level in 1..errors.len() {
                 let what = format!("{size:?} {tiles:?} level {level}");
@@ -119,7 +90,7 @@ mod tests {
     fn no_vertex_goes_further_than_its_levels_error_where_there_are_no_holes() {
         let field = synth::synth(synth::Kind::Eroded, [129, 97], 5);
         let bounds = bounds(&field);
-        let (errors, ways) = (largest_errors(&field, &bounds), largest_ways(&field, &bounds));
+        let (errors, ways) = (largest_errors(&bounds), largest_ways(&field, &bounds));
         for level in 1..errors.len() {
             assert!(ways[level] > 0.0 && ways[level] <= errors[level] * (1.0 + 1e-5), "{level}: {ways:?} {errors:?}");
         }

@@ -4,6 +4,7 @@ mod archive;
 mod asc;
 mod bil;
 pub mod bounds;
+mod cuts;
 pub mod demo;
 mod envi;
 mod geokeys;

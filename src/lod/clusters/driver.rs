@@ -65,7 +65,6 @@ pub fn driver(tree: &Tree, cells: u32, seams: Seams, seeds: &Seeds, mesh: &Mesh,
         period: tree.bounds.period().map(|n| n.unwrap_or(0)),
         cells,
         root,
-        cuts: u32::from(tree.bounds.has_errors()),
         skirts: match (seams, &tree.errors) {
             (Seams::Shared, _) => 0,
             (Seams::Skirts, Errors::Halved(_)) => 2,
@@ -103,15 +102,15 @@ const HEAD: usize = size_of::<ClusterScratch>() / 4;
 fn table(tree: &Tree, seeds: &Seeds, mesh: &Mesh, head: &mut ClusterTree, room: &mut Room) -> Vec<u32> {
     let mut levels: Vec<u32> = Vec::new();
     let mut squares: Vec<u32> = Vec::new();
-    head.states = 4 * (head.root + 1);
+    head.states = 5 * (head.root + 1);
     head.ranges = head.states + 81;
     let before = head.ranges + 2 * head.seeds;
+    // No device need know of infinite numbers.
+    let finite = |metres: f32| metres.clamp(f32::MIN, f32::MAX).to_bits();
     for level in 0..=head.root {
         let ([x, z], held) = tree.bounds.held(level);
         let most = if level == 0 { 0 } else { tree.nodes(level).min(head.most as usize) };
-        levels.extend([before + squares.len() as u32, x, z, room.take(most)]);
-        // No device need know of infinite numbers.
-        let finite = |height: f32| height.clamp(f32::MIN, f32::MAX).to_bits();
+        levels.extend([before + squares.len() as u32, x, z, room.take(most), finite(tree.bounds.cut(level))]);
         squares.extend(held.iter().flat_map(|square| {
             let [low, high] = square.range.map(finite);
             [tree.error(level, square.error).to_bits(), low, high]

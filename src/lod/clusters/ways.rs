@@ -26,7 +26,7 @@ const FARTHEST_M: f64 = 1e12;
 
 /// What may be off, metres, while blocks go over into each level.
 pub fn errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
-    let (errors, ways) = (level_errors::largest_errors(field, bounds), level_errors::largest_ways(field, bounds));
+    let (errors, ways) = (level_errors::largest_errors(bounds), level_errors::largest_ways(field, bounds));
     let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
     let rounding = ROUNDING * low.abs().max(high.abs());
     let error = |level: usize| match level {
