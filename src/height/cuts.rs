@@ -7,10 +7,12 @@ use super::levels::Patch;
 /// The largest error, metres, of the cells of each level that the end of a tiled field cuts, as
 /// [`Bounds`](super::bounds::Bounds) have it of squares, from level 0 on; infinite where they may lie anywhere in the
 /// period, or are as long: there it is no more than what their samples are apart.
-pub fn errors(field: &Field, measure: Measure, levels: u32) -> Vec<f32> {
+/// `highest` is the largest height above or below 0, metres.
+pub fn errors(field: &Field, measure: Measure, levels: u32, highest: f32) -> Vec<f32> {
     let mut errors: Vec<f32> = vec![0.0];
     for level in 1..levels {
-        let own = [0, 1].map(|axis| Cut { field, measure, level, axis }.error()).into_iter().fold(0.0, f32::max);
+        let own =
+            [0, 1].map(|axis| Cut { field, measure, highest, level, axis }.error()).into_iter().fold(0.0, f32::max);
         errors.push(own.max(errors[level as usize - 1] * measure.growth));
     }
     errors
@@ -20,6 +22,7 @@ pub fn errors(field: &Field, measure: Measure, levels: u32) -> Vec<f32> {
 struct Cut<'a> {
     field: &'a Field,
     measure: Measure,
+    highest: f32,
     level: u32,
     axis: usize,
 }
@@ -56,12 +59,6 @@ impl Cut<'_> {
         if !self.measure.morph {
             return own;
         }
-        let highest = (first[across]..=(start + length).min(last[across])).map(|n| {
-            let mut at = last;
-            at[across] = n;
-            self.field.height(at[0], at[1]).abs()
-        });
-        let rounding = highest.fold(0.0, f32::max) * ROUNDING;
-        own.max(patch(self.level - 1).stitched_deviation(2)) + rounding
+        own.max(patch(self.level - 1).stitched_deviation(2)) + self.highest * ROUNDING
     }
 }
