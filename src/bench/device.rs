@@ -117,6 +117,7 @@ impl Laboratory for DeviceLaboratory {
                 draws: list.draws.len() as u64,
                 commands: list.commands() as u64,
                 widening: list.widening,
+                waiting: list.waiting as u64,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;

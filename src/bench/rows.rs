@@ -165,6 +165,13 @@ pub struct Times {
     /// kept.
     #[serde(with = "extended", default = "kept")]
     pub widening: f64,
+    /// Instances in sight that were coarser than the tolerance allows because what is finer was not there yet, the most
+    /// of any frame.
+    #[serde(default)]
+    pub waiting: u64,
+    /// Frames with such instances.
+    #[serde(default)]
+    pub waiting_frames: usize,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
     /// The most memory that the process has held, bytes.

@@ -58,6 +58,8 @@ pub struct Frame {
     pub commands: u64,
     /// What the tolerance was multiplied by: 1 where it was kept.
     pub widening: f64,
+    /// Instances in sight whose refinement waited.
+    pub waiting: u64,
 }
 
 /// What drawing a scene once took.
@@ -251,6 +253,8 @@ impl Times {
             draws: counts(|frame| frame.draws),
             commands: counts(|frame| frame.commands),
             widening: frames.iter().map(|frame| frame.widening).fold(1.0, f64::max),
+            waiting: frames.iter().map(|frame| frame.waiting).max().unwrap_or(0),
+            waiting_frames: frames.iter().filter(|frame| frame.waiting > 0).count(),
             device_bytes: timed.device_bytes,
             host_bytes: host_bytes(),
         }

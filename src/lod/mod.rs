@@ -6,6 +6,7 @@ pub mod brute_force;
 pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
+pub mod smooth_tiles;
 
 use std::sync::Arc;
 
@@ -53,6 +54,12 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
+    /// Whether another selection in the view of the last one gives the same list: nothing goes on gradually, and nothing
+    /// waits.
+    fn is_settled(&self) -> bool {
+        true
+    }
+
     /// Whether its instances have weights ([`weights`](crate::draw::weights)): its lattice vertices morph, or fall
     /// onto coarser sides.
     fn morphs(&self) -> bool {
@@ -97,7 +104,7 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY];
+pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY, smooth_tiles::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

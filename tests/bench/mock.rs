@@ -62,6 +62,7 @@ impl Laboratory for Mock {
                 draws: 12,
                 commands: 1,
                 widening: 1.0,
+                waiting: 0,
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);

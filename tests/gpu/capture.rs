@@ -60,6 +60,8 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters:draw-per-block", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters:gpu-driven", &["block=8", "morph=on"]),
+                ("smooth-tiles", &["tile=17"]),
+                ("smooth-tiles", &["tile=9", "morph=off"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());

@@ -105,6 +105,7 @@ pub(crate) fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
         size,
         near: 1.0,
         tolerance: Tolerance { px, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

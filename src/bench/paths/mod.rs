@@ -79,7 +79,9 @@ impl Path {
     /// The views of the whole path in `frames` steps.
     pub fn views(&self, field: &Field, frames: usize, size: [u32; 2], tolerance: Tolerance) -> Vec<View> {
         let near = near(field);
-        self.poses(field, frames).iter().map(|pose| pose.view(size, near, tolerance)).collect()
+        let view =
+            |(k, pose): (u32, &Pose)| View { time_s: f64::from(k) * TIME_STEP_S, ..pose.view(size, near, tolerance) };
+        (0..).zip(&self.poses(field, frames)).map(view).collect()
     }
 }
 
@@ -100,6 +102,7 @@ impl Pose {
             size,
             near,
             tolerance,
+            time_s: 0.0,
         }
     }
 }

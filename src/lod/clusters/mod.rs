@@ -204,7 +204,13 @@ impl Clusters {
 
     fn push(&self, list: &mut DrawList, seed: usize, instances: std::ops::Range<u32>) {
         let indices = self.mesh.ranges[seed].clone();
-        list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+        list.draws.push(Draw {
+            source: Source::Lattice,
+            topology: Topology::Triangles,
+            indices,
+            instances,
+            first_vertex: 0,
+        });
     }
 }
 

@@ -1,0 +1,141 @@
+//! Smooth tiles whatever the viewer and the clock do: one surface in every frame, and the bound wherever nothing waits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use cuesta::draw::DrawList;
+use cuesta::draw::weights::{ONE, get, inside};
+use cuesta::height::{Field, Holes, Samples};
+use cuesta::lod::Technique;
+use cuesta::measure::{geometric, watertight};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::technique;
+
+/// Scripts of random views.
+const SCRIPTS: u32 = 10_000;
+
+/// Frames of a script.
+const FRAMES: u32 = 7;
+
+struct Random(u64);
+
+impl Random {
+    fn number(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
+        of[(self.number() * of.len() as f64) as usize]
+    }
+}
+
+/// Rough, smooth and a cliff; whole tiles and such that stick out.
+fn fields() -> Vec<Arc<Field>> {
+    let field = |size: [u32; 2], height: &dyn Fn(u32, u32) -> f32| {
+        let heights = (0..size[0] * size[1]).map(|k| height(k % size[0], k / size[0])).collect();
+        let holes = Holes::none((size[0] * size[1]) as usize);
+        Arc::new(Field::new(Samples::F32(heights), size, [2.0, 2.0], holes))
+    };
+    let rough = |i: u32, j: u32| ((i * 7919 + j * 104_729) % 101) as f32 / 5.0;
+    let smooth = |i: u32, j: u32| 30.0 * ((i as f32 / 11.0).sin() + (j as f32 / 7.0).cos());
+    let cliff = |i: u32, j: u32| if i + j / 3 > 20 { 60.0 } else { rough(i, j) / 8.0 };
+    vec![field([33, 33], &rough), field([41, 33], &smooth), field([33, 41], &cliff), field([30, 37], &rough)]
+}
+
+/// A view of a script: near or far, with any tolerance.
+fn view(field: &Field, random: &mut Random, time_s: f64) -> View {
+    let [w, h] = field.size().map(f64::from);
+    let at = |random: &mut Random| field.world_at(w * random.number(), h * random.number(), 80.0 * random.number());
+    let eye = at(random) + DVec3::Y * random.one_of(&[1.0, 60.0, 2000.0]) * random.number();
+    let target = at(random);
+    View {
+        eye,
+        world_from_eye: View::looking_along(target - eye),
+        lens: Lens::Perspective { fov_x: 0.3 + 1.8 * random.number() },
+        size: [320, 200],
+        near: 0.1,
+        tolerance: Tolerance { px: random.one_of(&[0.3, 1.0, 3.0, 10.0, 40.0]), metric: Metric::Certified },
+        time_s,
+    }
+}
+
+/// The next view: a step on, a turn back, a teleport, another tolerance, or the same once more.
+fn next(field: &Field, random: &mut Random, [before, last]: [&View; 2]) -> View {
+    let dt = random.one_of(&[0.0, 1e-6, 0.1, 0.3, 10.0, 1e9, -5.0]);
+    let time_s = last.time_s + dt;
+    let way = DVec3::new(random.number() - 0.5, random.number() - 0.5, random.number() - 0.5);
+    let step = View { eye: last.eye + way * random.one_of(&[1.0, 10.0]), time_s, ..*last };
+    let other = random.one_of(&[0.5, 0.9, 1.1, 2.0]) * last.tolerance.px;
+    match (random.number() * 6.0) as u32 {
+        0 => View { time_s, ..*before },
+        1 => view(field, random, time_s),
+        2 => View { tolerance: Tolerance { px: other, ..last.tolerance }, ..step },
+        3 => View { time_s, ..*last },
+        _ => step,
+    }
+}
+
+/// What all scripts together came across.
+#[derive(Default)]
+struct Seen {
+    frames: AtomicU64,
+    morphing: AtomicU64,
+    waiting: AtomicU64,
+    stitched: AtomicU64,
+}
+
+impl Seen {
+    fn count(&self, list: &DrawList) {
+        self.frames.fetch_add(1, Relaxed);
+        let is_between = |weight: u32| weight > 0 && weight < ONE;
+        let morphing = list.instances.iter().any(|tile| is_between(get(tile, inside(0))));
+        self.morphing.fetch_add(u64::from(morphing), Relaxed);
+        self.waiting.fetch_add(u64::from(list.waiting > 0), Relaxed);
+        self.stitched.fetch_add(u64::from(list.levels().iter().filter(|&&n| n > 0).count() > 1), Relaxed);
+    }
+}
+
+fn check(script: u32, field: &Field, technique: &mut dyn Technique, views: &[View], seen: &Seen) {
+    for (frame, view) in views.iter().enumerate() {
+        let mut list = DrawList::default();
+        technique.select(view, &mut list);
+        let proof = watertight::prove_list(field, view, technique.seams(), technique.resident(), &list);
+        proof.unwrap_or_else(|why| panic!("script {script}, frame {frame}: {why}"));
+        if list.waiting == 0 && script.is_multiple_of(4) {
+            let max_px = geometric::errors(field, view, technique.resident(), &list).screen_px.max;
+            let px = view.tolerance.px;
+            assert!(max_px <= px * (1.0 + 1e-9), "script {script}, frame {frame}: {max_px} px of {px}");
+        }
+        seen.count(&list);
+    }
+}
+
+#[test]
+fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
+    let (fields, seen) = (fields(), Seen::default());
+    (0..SCRIPTS).into_par_iter().for_each(|script| {
+        let random = &mut Random(u64::from(script) << 20 | 0x5eed);
+        (0..5).for_each(|_| _ = random.number());
+        let field = &fields[script as usize % fields.len()];
+        let clock = random.one_of(&["clock=speed", "clock=time", "clock=frames"]);
+        let rebuild = random.one_of(&["rebuild=1", "rebuild=1", "rebuild=16", "rebuild=all"]);
+        let tile = random.one_of(&["tile=9", "tile=9", "tile=17"]);
+        let mut technique = technique(field, "smooth-tiles", &[tile, clock, rebuild]);
+        let mut views = vec![view(field, random, 0.0)];
+        for _ in 1..FRAMES {
+            let before = views[views.len().saturating_sub(2)];
+            views.push(next(field, random, [&before, &views[views.len() - 1]]));
+        }
+        check(script, field, &mut *technique, &views, &seen);
+    });
+    let [frames, morphing, waiting, stitched] =
+        [seen.frames, seen.morphing, seen.waiting, seen.stitched].map(AtomicU64::into_inner);
+    println!(
+        "{frames} frames, {morphing} in mid-morph, {stitched} of several levels, {waiting} with something waiting"
+    );
+    assert!(morphing > frames / 20 && waiting > frames / 20 && stitched > frames / 20, "all of it occurs");
+}
