@@ -55,7 +55,7 @@ fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
             further: 1400.0 - 0.9 * k as f32,
             morph: k as f32 / 1999.0,
             // Of neither, of the vertex, of both.
-            regions: [0, 1 + k % 32, 1 + k % 32 | (1 + k * 7 % 32) << 8][k as usize % 3],
+            regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
         },
         instance: Instance {
             origin: [5, 3],

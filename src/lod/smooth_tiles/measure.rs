@@ -98,7 +98,7 @@ impl<'a> Tile<'a> {
 
     /// The triangles of a tile of a single cell.
     fn single(&self) -> Vec<Triangle> {
-        let odd = (self.place.origin[0] + self.place.origin[1]) / self.place.cells & 1;
+        let odd = ((self.place.origin[0] + self.place.origin[1]) / self.place.cells) & 1;
         crate::height::rtin::cell(odd, 0).map(|triangle| triangle.map(|[x, z]| [x - odd, z])).into()
     }
 

@@ -73,9 +73,9 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "rebuild",
-            values: Values::Words(&["all", "16", "1"]),
-            default: "all",
-            about: "chunks rebuilt in a frame at most; all: as many as 64 MiB hold",
+            values: Values::Number(1.0, 100_000.0),
+            default: "100000",
+            about: "chunks rebuilt in a frame at most (the paper: 1), and no more than 64 MiB hold",
         },
         Setting {
             key: "memory",
@@ -121,7 +121,7 @@ impl SmoothTiles {
         let tiles = Tiles::new(&field, cells, morphs);
         let vertex = size_of::<ExplicitVertex>();
         let queue = Queue::new(&tiles, (settings.number("memory") * 1048576.0) as usize / vertex);
-        let chunks = if settings.word("rebuild") == "all" { usize::MAX } else { settings.number("rebuild") as usize };
+        let chunks = settings.number("rebuild") as usize;
         let vertices = queue.vertices().min(UPLOAD_BYTES / vertex);
         let patterns = Patterns::new(cells);
         let side_m = f64::from(cells) * field.spacing[0].max(field.spacing[1]);
