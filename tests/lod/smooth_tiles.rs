@@ -141,8 +141,11 @@ fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
     assert!(morphing > frames / 20 && waiting > frames / 20 && stitched > frames / 20, "all of it occurs");
 }
 
+/// Corners: lattice position, and height as bits.
+type Triangle = [(i32, i32, u32); 3];
+
 /// The triangles of a view once the technique has settled in it, in any order, and how many frames that took.
-fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<[(i32, i32, u32); 3]>, u32) {
+fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Triangle>, u32) {
     for frame in 1..5000 {
         let mut list = DrawList::default();
         technique.select(&View { time_s: view.time_s + f64::from(frame), ..*view }, &mut list);
@@ -150,7 +153,7 @@ fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<[(
             assert_eq!(list.waiting, 0, "nothing waits any more");
             let frame_data = Frame::placing(field, view);
             let drawn = expand::triangles(field, &frame_data, technique.resident(), &list);
-            let mut triangles: Vec<_> = drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect();
+            let mut triangles: Vec<Triangle> = drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect();
             triangles.sort_unstable();
             return (triangles, frame);
         }

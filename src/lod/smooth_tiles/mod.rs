@@ -125,7 +125,7 @@ impl SmoothTiles {
         let vertices = queue.vertices().min(UPLOAD_BYTES / vertex);
         let patterns = Patterns::new(cells);
         let side_m = f64::from(cells) * field.spacing[0].max(field.spacing[1]);
-        let (top, count) = (tiles.levels - 1, tiles.len());
+        let (top, count) = (tiles.levels - 1, tiles.total());
         let mut room = Self {
             resident: Geometry {
                 vertices: vec![ExplicitVertex::default(); queue.vertices()],
@@ -151,7 +151,7 @@ impl SmoothTiles {
     }
 
     fn build_coarsest(&mut self, top: u32) {
-        for tile in 0..self.tiles.len() {
+        for tile in 0..self.tiles.total() {
             let vertices = chunk::build(&self.field, self.tiles.place(tile), top);
             self.write(self.queue.first_vertices[tile], &vertices);
         }
@@ -169,7 +169,7 @@ impl SmoothTiles {
         let ceiling = if self.morphs { levels::ceiling } else { levels::whole_ceiling };
         let allowed = |tile: usize| allowance.error(&self.tiles.bounds(tile));
         own.clear();
-        own.extend((0..self.tiles.len()).map(|tile| ceiling(self.tiles.errors(tile), allowed(tile))));
+        own.extend((0..self.tiles.total()).map(|tile| ceiling(self.tiles.errors(tile), allowed(tile))));
         restricted.clone_from(own);
         levels::restrict(restricted, self.tiles.count);
     }
@@ -252,7 +252,7 @@ impl Technique for SmoothTiles {
     }
 
     fn limits(&self) -> Limits {
-        let count = self.tiles.len();
+        let count = self.tiles.total();
         let upload_bytes = self.budget.vertices * size_of::<ExplicitVertex>();
         Limits { draws: 2 * count, instances: count, upload_bytes, ..Limits::default() }
     }
@@ -278,7 +278,7 @@ impl Technique for SmoothTiles {
             let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
             self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
         };
-        self.queue.is_at_rest() && (is_still || (0..self.tiles.len()).all(stands))
+        self.queue.is_at_rest() && (is_still || (0..self.tiles.total()).all(stands))
     }
 
     fn keeps_tolerance(&self) -> bool {
@@ -288,7 +288,7 @@ impl Technique for SmoothTiles {
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
         let bytes = |count: usize| (count * size_of::<ExplicitVertex>()) as f64;
         vec![
-            ("tiles", self.tiles.len() as f64, ""),
+            ("tiles", self.tiles.total() as f64, ""),
             ("vertex bytes on the device", bytes(self.queue.vertices()), "B"),
             ("index bytes", size_of_val(self.patterns.indices.as_slice()) as f64, "B"),
         ]

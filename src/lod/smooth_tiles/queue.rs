@@ -43,7 +43,7 @@ impl Queue {
     /// All tiles at their coarsest level, and at most so many vertices, if those fit.
     pub fn new(tiles: &Tiles, most_vertices: usize) -> Self {
         let sizes: Vec<_> = (0..tiles.levels).map(|level| chunk::vertices(tiles.cells, level)).collect();
-        let (top, count) = (tiles.levels - 1, tiles.len());
+        let (top, count) = (tiles.levels - 1, tiles.total());
         let all_at = |levels: &[u32]| -> Vec<usize> {
             (0..tiles.levels).map(|level| if levels.contains(&level) { count } else { 0 }).collect()
         };

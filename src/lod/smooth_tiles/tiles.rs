@@ -51,7 +51,7 @@ impl Tiles {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub fn total(&self) -> usize {
         self.count[0] * self.count[1]
     }
 
