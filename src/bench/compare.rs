@@ -1,10 +1,12 @@
 //! What changed from one benchmark to another: times as ratios with intervals, counts and errors exactly.
 //!
-//! The cases of a technique are tested together, as they tell much smaller changes from noise than one case with its
-//! handful of rounds: round by round the mean over the cases of the time relative to the case's own middle, without the
-//! extreme fifths. That is a regression if the whole interval lies above 1 + threshold. A single case is one if its
-//! whole interval lies above 1 + twice the threshold. Many things are tested at once, so tails are divided among them
-//! (Bonferroni): the chance of any false alarm stays below 5 % even if the truth is the threshold itself.
+//! Frames are held against each other as [`slowdown`] has it, over their floors: those tell how fast the machine was, and
+//! are compared by themselves, as they tell of shading too.
+//!
+//! All cases of a technique are tested together: that is a regression if the whole interval lies above 1 + threshold.
+//! A single case, or all floors together, are one if it lies above 1 + twice the threshold. Many things are tested at
+//! once, so tails are divided among the techniques and among the cases (Bonferroni). With fewer than [`LEAST_ROUNDS`]
+//! rounds in either run no time is judged.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +14,12 @@ use serde::Serialize;
 
 use super::results::{CaseResult, Results};
 use super::rows::Errors;
-use super::statistics::{Estimate, middle, trimmed_mean};
+use super::slowdown::{Cost, LEAST_ROUNDS, Pair, has_floors, slowdown};
+use super::statistics::Estimate;
 
 /// What is no regression yet: a tenth.
 pub const THRESHOLD: f64 = 0.1;
-/// Chance of any false alarm.
+/// Share of intervals that may miss the truth, all of a kind together.
 const ALARM: f64 = 0.05;
 
 /// What changed.
@@ -24,6 +27,12 @@ const ALARM: f64 = 0.05;
 pub struct Comparison {
     /// Cases that both have.
     pub matched: usize,
+    /// Whether both runs have rounds enough to judge times by.
+    pub is_judged: bool,
+    /// Whether times are over the floor's; milliseconds where one of the two has no floors.
+    pub over_floor: bool,
+    /// Times of the floors, all cases together.
+    pub floors: Option<Change>,
     /// Times by technique, all its cases together.
     pub techniques: Vec<Change>,
     /// Times by case.
@@ -67,53 +76,35 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
     let timed: Vec<_> = pairs.iter().copied().filter(|(a, b)| a.time.is_some() && b.time.is_some()).collect();
-    let test = |what: String, a: &[f64], b: &[f64], family: usize, allowed: f64| {
-        let ratio = Estimate::ratio(a, b, ALARM / family as f64);
-        Change { what, ratio, is_regression: ratio.low > 1.0 + allowed }
+    let is_judged = timed.iter().all(|(a, b)| a.rounds.len().min(b.rounds.len()) >= LEAST_ROUNDS);
+    let over_floor = timed.iter().all(|(a, b)| has_floors(a) && has_floors(b));
+    let change = |what: String, pairs: &[Pair], cost: Cost, family: usize, allowed: f64| {
+        let ratio = slowdown(pairs, cost, ALARM / family as f64);
+        Change { what, ratio, is_regression: is_judged && ratio.low > 1.0 + allowed }
     };
-    let cases: Vec<_> = timed
-        .iter()
-        .map(|(a, b)| test(a.case.to_string(), &times(a), &times(b), timed.len(), 2.0 * threshold))
-        .collect();
+    let cost = if over_floor { Cost::OverFloor } else { Cost::Frame };
+    let of_case = |pair: &Pair| change(pair.0.case.to_string(), &[*pair], cost, timed.len(), 2.0 * threshold);
+    let cases: Vec<_> = timed.iter().map(of_case).collect();
     let families = by_technique(&timed);
-    let pooled = families.iter().map(|(name, pairs)| {
-        let [a, b] = pooled(pairs);
-        test(format!("{name}, {} cases", pairs.len()), &a, &b, families.len(), threshold)
-    });
-    let techniques: Vec<_> = pooled.collect();
+    let together = |name: &str, pairs: &[Pair]| format!("{name}, {} cases", pairs.len());
+    let of_technique =
+        |(name, pairs): (&String, &Vec<Pair>)| change(together(name, pairs), pairs, cost, families.len(), threshold);
+    let techniques: Vec<_> = families.iter().map(of_technique).collect();
+    let has_floors = over_floor && !timed.is_empty();
+    let floors = has_floors.then(|| change(together("floor", &timed), &timed, Cost::Floor, 1, 2.0 * threshold));
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
-    let regressions = regressions(&techniques, &cases, &differences);
-    Comparison { matched: pairs.len(), techniques, cases, differences, unmatched: unmatched(a, b), regressions }
+    let regressions = regressions(floors.iter().chain(&techniques).chain(&cases), &differences);
+    let matched = pairs.len();
+    let unmatched = unmatched(a, b);
+    Comparison { matched, is_judged, over_floor, floors, techniques, cases, differences, unmatched, regressions }
 }
 
-/// The median frame times of a case's rounds.
-fn times(case: &CaseResult) -> Vec<f64> {
-    case.rounds.iter().map(|round| round.frame_ms.p50).collect()
-}
-
-type Pairs<'a> = Vec<(&'a CaseResult, &'a CaseResult)>;
-
-fn by_technique<'a>(pairs: &Pairs<'a>) -> BTreeMap<String, Pairs<'a>> {
-    let mut families: BTreeMap<String, Pairs> = BTreeMap::new();
+fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
+    let mut families: BTreeMap<String, Vec<Pair>> = BTreeMap::new();
     for &(a, b) in pairs {
         families.entry(a.case.series()).or_default().push((a, b));
     }
     families
-}
-
-/// Round by round, the trimmed mean over the cases of the time relative to the middle of the case's times in both runs.
-fn pooled(pairs: &Pairs) -> [Vec<f64>; 2] {
-    let mut rounds: [BTreeMap<usize, Vec<f64>>; 2] = Default::default();
-    for (a, b) in pairs {
-        // Half way between the two medians, so that neither run's count of rounds shifts it.
-        let centre = (middle(times(a)) * middle(times(b))).sqrt();
-        for (side, case) in [a, b].into_iter().enumerate() {
-            for round in &case.rounds {
-                rounds[side].entry(round.round).or_default().push(round.frame_ms.p50 / centre);
-            }
-        }
-    }
-    rounds.map(|rounds| rounds.into_values().map(trimmed_mean).collect())
 }
 
 /// A value of the errors, and whether any growth of it breaks a promise.
@@ -158,12 +149,12 @@ fn unmatched(a: &Results, b: &Results) -> Vec<String> {
     only_a.chain(only_b).collect()
 }
 
-fn regressions(techniques: &[Change], cases: &[Change], differences: &[Difference]) -> Vec<String> {
+fn regressions<'a>(changes: impl Iterator<Item = &'a Change>, differences: &[Difference]) -> Vec<String> {
     let slower = |change: &Change| {
         let Estimate { value, low, high } = change.ratio;
         format!("{}: {value:.3} times slower ({low:.3} to {high:.3})", change.what)
     };
-    let times = techniques.iter().chain(cases).filter(|change| change.is_regression).map(slower);
+    let times = changes.filter(|change| change.is_regression).map(slower);
     let worse = |d: &Difference| format!("{}: {} {} instead of {}", d.case, d.value, d.after, d.before);
     times.chain(differences.iter().filter(|d| d.is_regression).map(worse)).collect()
 }

@@ -12,6 +12,7 @@ pub mod pool;
 pub mod results;
 pub mod rows;
 pub mod run;
+pub mod slowdown;
 pub mod statistics;
 
 pub use rows::{Case, Errors, Header, Row, SCHEMA, Terrain, Times};

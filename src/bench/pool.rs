@@ -36,7 +36,7 @@ pub struct Pool {
     as_drawn: Option<bool>,
     hole_pixels: u64,
     skirt_pixels: u64,
-    pops: Option<(Histogram, f64, f64)>,
+    pops: Option<pop::Pop>,
     in_view: u64,
     sub_pixel: f64,
     shown: u64,
@@ -116,10 +116,12 @@ impl Pool {
     /// How far the surface jumped at a frame.
     pub fn pop(&mut self, pop: &pop::Pop) {
         match &mut self.pops {
-            None => self.pops = Some((pop.histogram.clone(), pop.p99_px, pop.max_px)),
-            Some((histogram, p99, max)) => {
-                histogram.merge(&pop.histogram);
-                (*p99, *max) = (p99.max(pop.p99_px), max.max(pop.max_px));
+            None => self.pops = Some(pop.clone()),
+            Some(all) => {
+                all.histogram.merge(&pop.histogram);
+                all.p99_px = all.p99_px.max(pop.p99_px);
+                all.p999_px = all.p999_px.max(pop.p999_px);
+                all.max_px = all.max_px.max(pop.max_px);
             }
         }
     }
@@ -178,10 +180,11 @@ impl Pool {
             within: Some(within),
             by_angle: self.by_angle(),
             image: self.image(),
-            pop: self.pops.as_ref().map(|(histogram, p99_px, max_px)| Pop {
-                p99_px: *p99_px,
-                max_px: *max_px,
-                histogram: bins(histogram),
+            pop: self.pops.as_ref().map(|pop| Pop {
+                p99_px: pop.p99_px,
+                p999_px: pop.p999_px,
+                max_px: pop.max_px,
+                histogram: bins(&pop.histogram),
             }),
             watertight: Some(self.counter_example.is_none()),
             counter_example: self.counter_example.clone(),

@@ -66,6 +66,10 @@ pub struct TimeSummary {
     pub over_floor: Option<Estimate>,
     /// Frame time over the base case's of the same scene, pair by pair within a round.
     pub over_base: Option<Estimate>,
+    /// Median of selection and recording together, milliseconds: what the host does of a frame.
+    pub cpu_ms: Estimate,
+    /// The same over the base case's.
+    pub cpu_over_base: Option<Estimate>,
     /// Hitches in a hundred frames.
     pub hitches_percent: f64,
     /// Mean triangles a frame.
@@ -129,9 +133,13 @@ fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult 
     &mut cases[at]
 }
 
-/// The base case of a case's scene.
+/// The base case of a case's scene: that of the same tolerance and settings where there is one.
 fn base_of<'a>(of: &CaseResult, cases: &'a [CaseResult], base: &str) -> Option<&'a CaseResult> {
-    cases.iter().find(|result| result.case.technique == base && result.case.scene() == of.case.scene())
+    let of = &of.case;
+    let unlike =
+        |case: &Case| (case.tolerance_px != of.tolerance_px, case.metric != of.metric, case.settings != of.settings);
+    let all = cases.iter().filter(|result| result.case.technique == base && result.case.scene() == of.scene());
+    all.min_by_key(|result| unlike(&result.case))
 }
 
 fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary> {
@@ -143,11 +151,15 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
     let measured = |of: fn(&Times) -> Option<f64>| -> Option<f64> {
         rounds.iter().map(of).collect::<Option<Vec<_>>>().map(middle)
     };
-    let ratios: Vec<f64> = base.map(|base| pairs(rounds, &base.rounds)).unwrap_or_default();
+    let over_base = |cost: Cost| {
+        let ratios = base.map(|base| pairs(rounds, &base.rounds, cost)).unwrap_or_default();
+        (!ratios.is_empty()).then(|| Estimate::median(&ratios))
+    };
+    let median = |cost: Cost| Estimate::median(&rounds.iter().map(cost).collect::<Vec<_>>());
     let floors: Option<Vec<f64>> = rounds.iter().map(|r| r.floor_ms.map(|floor| r.frame_ms.p50 / floor.p50)).collect();
     let frames = (rounds.len() * result.case.frames).max(1);
     Some(TimeSummary {
-        frame_ms: Estimate::median(&rounds.iter().map(|r| r.frame_ms.p50).collect::<Vec<_>>()),
+        frame_ms: median(frame_ms),
         frame_p95_ms: over(|r| r.frame_ms.p95),
         frame_p99_ms: over(|r| r.frame_ms.p99),
         frame_max_ms: over(|r| r.frame_ms.max),
@@ -157,7 +169,9 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         upload_ms: measured(|r| r.upload_ms.map(|p| p.p50)),
         floor_ms: measured(|r| r.floor_ms.map(|p| p.p50)),
         over_floor: floors.map(|ratios| Estimate::median(&ratios)),
-        over_base: (!ratios.is_empty()).then(|| Estimate::median(&ratios)),
+        over_base: over_base(frame_ms),
+        cpu_ms: median(cpu_ms),
+        cpu_over_base: over_base(cpu_ms),
         hitches_percent: 100.0 * rounds.iter().map(|r| r.hitches).sum::<usize>() as f64 / frames as f64,
         triangles: over(|r| r.triangles.mean),
         draws: over(|r| r.draws.mean),
@@ -167,10 +181,27 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
     })
 }
 
-/// Frame time over the base's, round by round where both have the round.
-fn pairs(rounds: &[Times], base: &[Times]) -> Vec<f64> {
+/// What is looked at in a round, milliseconds.
+type Cost = fn(&Times) -> f64;
+
+fn frame_ms(round: &Times) -> f64 {
+    round.frame_ms.p50
+}
+
+fn cpu_ms(round: &Times) -> f64 {
+    round.select_ms.p50 + round.record_ms.p50
+}
+
+/// A cost over the base's, round by round where both have the round.
+fn pairs(rounds: &[Times], base: &[Times], cost: Cost) -> Vec<f64> {
     let partner = |round: usize| base.iter().find(|other| other.round == round);
-    rounds.iter().filter_map(|r| partner(r.round).map(|other| r.frame_ms.p50 / other.frame_ms.p50)).collect()
+    rounds.iter().filter_map(|r| partner(r.round).map(|other| cost(r) / cost(other))).collect()
+}
+
+/// The frame time of a case over that of another, pair by pair within a round; `None` if no round has both.
+pub fn frame_ratio(of: &CaseResult, over: &CaseResult) -> Option<Estimate> {
+    let ratios = pairs(&of.rounds, &over.rounds, frame_ms);
+    (!ratios.is_empty()).then(|| Estimate::median(&ratios))
 }
 
 /// Writes both files from the rows of a directory and returns the path of `results.json`.

@@ -151,6 +151,12 @@ pub struct Times {
     pub upload_ms: Option<Percentiles>,
     /// The same pose with the same fragment work in one full-screen pass.
     pub floor_ms: Option<Percentiles>,
+    /// Every frame of the path in order, milliseconds: the times of which `frame_ms` tells.
+    #[serde(default)]
+    pub frames_ms: Vec<f64>,
+    /// The floors of the same frames; empty if they were not measured.
+    #[serde(default)]
+    pub floors_ms: Vec<f64>,
     /// Frames of more than twice the median.
     pub hitches: usize,
     /// Triangles drawn a frame.
@@ -285,6 +291,9 @@ pub struct Pop {
     /// 99 % are no larger, in every frame.
     #[serde(with = "extended")]
     pub p99_px: f64,
+    /// 99.9 % are no larger, in every frame.
+    #[serde(with = "extended", default)]
+    pub p999_px: f64,
     /// Largest.
     #[serde(with = "extended")]
     pub max_px: f64,

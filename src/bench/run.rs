@@ -228,6 +228,11 @@ impl Case {
     }
 }
 
+/// Milliseconds without what is below a microsecond: rows are text.
+fn whole_us(ms: f64) -> f64 {
+    (ms * 1e3).round() / 1e3
+}
+
 impl Times {
     /// Sums one round's frames up.
     pub fn of(round: usize, timed: Timed) -> Self {
@@ -247,6 +252,8 @@ impl Times {
             gpu_ms: measured(|frame| frame.gpu_ms),
             upload_ms: measured(|frame| frame.upload_ms),
             floor_ms: measured(|frame| frame.floor_ms),
+            frames_ms: frames.iter().map(|frame| whole_us(frame.frame_ms)).collect(),
+            floors_ms: frames.iter().filter_map(|frame| frame.floor_ms).map(whole_us).collect(),
             hitches: frames.iter().filter(|frame| frame.frame_ms > HITCH * frame_ms.p50).count(),
             triangles: counts(|frame| frame.triangles),
             vertices: vertices.map(Spread::of),

@@ -124,7 +124,7 @@ fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<
     let form = |variant: Option<&'static str>| {
         let name = variant.map_or(entry.name.to_string(), |variant| format!("{}:{variant}", entry.name));
         let settings = Settings::new(entry, variant, &args.technique.settings).map_err(anyhow::Error::msg)?;
-        let _spinner = report::spinner(common, format!("preparing {name}"));
+        let _spinner = report::preparing(common, &name, &settings.progress);
         Ok(Form { technique: (entry.build)(Arc::clone(field), &settings), name })
     };
     variants.into_iter().map(form).collect()

@@ -1,13 +1,15 @@
 //! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr.
 
+use std::fmt;
 use std::time::Duration;
 
 use anyhow::Result;
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::Common;
+use crate::height::progress::Progress;
 
 /// Prints a result: as one JSON document, or one line a field.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
@@ -51,6 +53,19 @@ pub fn warn(common: &Common, text: &str) {
     if !common.quiet {
         eprintln!("warning: {text}");
     }
+}
+
+/// As [`spinner`] for a technique, with the share that is done as soon as there is one.
+pub fn preparing(common: &Common, what: &str, progress: &Progress) -> ProgressBar {
+    let bar = spinner(common, format!("preparing {what}"));
+    let progress = progress.clone();
+    let share = move |_: &ProgressState, out: &mut dyn fmt::Write| {
+        let _ = progress.share().map_or(Ok(()), |share| write!(out, " {:.0} %", 100.0 * share));
+    };
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}{share}") {
+        bar.set_style(style.with_key("share", share));
+    }
+    bar
 }
 
 /// Shows on a terminal that something takes long; gone when dropped.

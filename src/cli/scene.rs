@@ -352,7 +352,7 @@ impl TechniqueArgs {
     /// The technique, prepared for the field.
     pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
         let (entry, settings) = self.settings()?;
-        let _spinner = report::spinner(common, format!("preparing {}", entry.name));
+        let _spinner = report::preparing(common, entry.name, &settings.progress);
         Ok((entry.build)(Arc::clone(field), &settings))
     }
 

@@ -25,10 +25,11 @@ const HEAD: usize = size_of::<Tally>();
 /// Pipelines, the table, and what each frame in flight writes.
 pub struct Driven {
     gpu: Arc<Gpu>,
+    pool: vk::CommandPool,
     slots: Vec<Slot>,
     pipelines: Vec<vk::Pipeline>,
     scratch: Buffer,
-    _table: Buffer,
+    table: Buffer,
     steps: Vec<Step>,
     draws: usize,
     /// The slot of the newest frame.
@@ -36,6 +37,8 @@ pub struct Driven {
 }
 
 struct Slot {
+    /// The whole selection, recorded once: a frame adds no more than its parameters.
+    selection: vk::CommandBuffer,
     bindings: Bindings,
     parameters: Buffer,
     instances: Buffer,
@@ -52,14 +55,23 @@ impl Driven {
         let table = filled(gpu, "selection table", bytemuck::cast_slice(&driver.table), Usage::STORAGE_BUFFER)?;
         let usage = Usage::STORAGE_BUFFER | Usage::INDIRECT_BUFFER;
         let scratch = Buffer::device(gpu, "selection scratch", 4 * driver.scratch as u64, usage)?;
-        let slots = (0..SLOTS).map(|_| Slot::new(gpu, driver, &table, &scratch)).collect::<Result<_>>()?;
+        // SAFETY: the device is alive; Drop destroys the pool.
+        let pool = unsafe {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);
+            gpu.raw.create_command_pool(&info, None)?
+        };
         let (gpu, steps, draws) = (Arc::clone(gpu), driver.steps.clone(), driver.draws);
-        let mut driven = Self { gpu, slots, pipelines: Vec::new(), scratch, _table: table, steps, draws, newest: 0 };
+        let (slots, pipelines) = (Vec::new(), Vec::new());
+        let mut driven = Self { gpu, pool, slots, pipelines, scratch, table, steps, draws, newest: 0 };
+        for _ in 0..SLOTS {
+            driven.slots.push(Slot::new(&driven.gpu, pool, driver, &driven.table, &driven.scratch)?);
+        }
         for program in driver.programs {
             let layout = driven.slots[0].bindings.layout;
             let pipeline = pipelines::compute(&driven.gpu, layout, program, program, &Constants::new(&[]))?;
             driven.pipelines.push(pipeline);
         }
+        driven.slots.iter().try_for_each(|slot| driven.record(slot))?;
         Ok(driven)
     }
 
@@ -69,58 +81,72 @@ impl Driven {
         let slot = &mut self.slots[self.newest];
         slot.parameters.write(0, bytemuck::cast_slice(parameters));
         slot.has_run = true;
+        let selection = [slot.selection];
         recording.scope("select", |r| {
-            self.record(r);
+            // SAFETY: the slot's last frame has ended, so its selection is not under way.
+            unsafe { r.gpu.raw.cmd_execute_commands(r.commands, &selection) };
             Ok(())
         })
     }
 
-    fn record(&self, r: &Recording) {
-        let slot = &self.slots[r.slot];
-        let (raw, point) = (&self.gpu.raw, vk::PipelineBindPoint::COMPUTE);
+    fn record(&self, slot: &Slot) -> Result<()> {
+        let inherited = vk::CommandBufferInheritanceInfo::default();
+        let info = vk::CommandBufferBeginInfo::default().inheritance_info(&inherited);
+        // SAFETY: nothing uses the new command buffer, and what is bound outlives it.
+        unsafe {
+            let (raw, point) = (&self.gpu.raw, vk::PipelineBindPoint::COMPUTE);
+            raw.begin_command_buffer(slot.selection, &info)?;
+            raw.cmd_bind_descriptor_sets(slot.selection, point, slot.bindings.layout, 0, &[slot.bindings.set], &[]);
+        }
+        self.record_steps(slot);
+        self.record_copy(slot);
+        // SAFETY: it was begun above.
+        Ok(unsafe { self.gpu.raw.end_command_buffer(slot.selection) }?)
+    }
+
+    fn record_steps(&self, slot: &Slot) {
         let working = Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE;
         let steps = (Stage::COMPUTE_SHADER | Stage::TRANSFER, working | Access::TRANSFER_WRITE);
         let reading = (Stage::COMPUTE_SHADER | Stage::DRAW_INDIRECT, working | Access::INDIRECT_COMMAND_READ);
         // Frames before may still work in the scratch.
-        memory_barrier(&self.gpu, r.commands, (steps.0 | reading.0, steps.1), steps);
-        // SAFETY: what is bound outlives the frame.
-        unsafe {
-            raw.cmd_bind_descriptor_sets(r.commands, point, slot.bindings.layout, 0, &[slot.bindings.set], &[]);
-        }
+        memory_barrier(&self.gpu, slot.selection, (steps.0 | reading.0, steps.1), steps);
         for step in &self.steps {
             match step {
                 Step::Fill(words, value) => {
                     let (first, bytes) = (4 * words.start as u64, 4 * words.len() as u64);
                     // SAFETY: the words lie in the scratch.
-                    unsafe { raw.cmd_fill_buffer(r.commands, self.scratch.raw, first, bytes, *value) };
+                    unsafe { self.gpu.raw.cmd_fill_buffer(slot.selection, self.scratch.raw, first, bytes, *value) };
                 }
                 Step::Run { program, groups, argument } => {
-                    memory_barrier(&self.gpu, r.commands, steps, reading);
-                    self.run(r, slot, *program, *groups, *argument);
+                    memory_barrier(&self.gpu, slot.selection, steps, reading);
+                    self.run(slot, *program, *groups, *argument);
                 }
             }
         }
+    }
+
+    fn record_copy(&self, slot: &Slot) {
         let used = (
             Stage::DRAW_INDIRECT | Stage::VERTEX_ATTRIBUTE_INPUT | Stage::COPY,
             Access::INDIRECT_COMMAND_READ | Access::VERTEX_ATTRIBUTE_READ | Access::TRANSFER_READ,
         );
-        memory_barrier(&self.gpu, r.commands, (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE), used);
+        memory_barrier(&self.gpu, slot.selection, (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE), used);
         let region = [vk::BufferCopy { size: slot.found.size, ..Default::default() }];
         // SAFETY: both buffers are of this size and live until the frame has ended.
-        unsafe { raw.cmd_copy_buffer(r.commands, slot.commands.raw, slot.found.raw, &region) };
+        unsafe { self.gpu.raw.cmd_copy_buffer(slot.selection, slot.commands.raw, slot.found.raw, &region) };
         let copied = (Stage::COPY, Access::TRANSFER_WRITE);
-        memory_barrier(&self.gpu, r.commands, copied, (Stage::HOST, Access::HOST_READ));
+        memory_barrier(&self.gpu, slot.selection, copied, (Stage::HOST, Access::HOST_READ));
     }
 
-    fn run(&self, r: &Recording, slot: &Slot, program: usize, groups: Groups, argument: u32) {
+    fn run(&self, slot: &Slot, program: usize, groups: Groups, argument: u32) {
         let (raw, stage) = (&self.gpu.raw, vk::ShaderStageFlags::COMPUTE);
         // SAFETY: the pipelines outlive the frame; group counts lie in the scratch.
         unsafe {
-            raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::COMPUTE, self.pipelines[program]);
-            raw.cmd_push_constants(r.commands, slot.bindings.layout, stage, 0, &argument.to_ne_bytes());
+            raw.cmd_bind_pipeline(slot.selection, vk::PipelineBindPoint::COMPUTE, self.pipelines[program]);
+            raw.cmd_push_constants(slot.selection, slot.bindings.layout, stage, 0, &argument.to_ne_bytes());
             match groups {
-                Groups::One => raw.cmd_dispatch(r.commands, 1, 1, 1),
-                Groups::Counted(word) => raw.cmd_dispatch_indirect(r.commands, self.scratch.raw, 4 * word as u64),
+                Groups::One => raw.cmd_dispatch(slot.selection, 1, 1, 1),
+                Groups::Counted(word) => raw.cmd_dispatch_indirect(slot.selection, self.scratch.raw, 4 * word as u64),
             }
         }
     }
@@ -208,8 +234,15 @@ fn draw(command: &[u8]) -> Draw {
 }
 
 impl Slot {
-    fn new(gpu: &Arc<Gpu>, driver: &Driver, table: &Buffer, scratch: &Buffer) -> Result<Self> {
+    fn new(gpu: &Arc<Gpu>, pool: vk::CommandPool, driver: &Driver, table: &Buffer, scratch: &Buffer) -> Result<Self> {
         use vk::BufferUsageFlags as Usage;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .level(vk::CommandBufferLevel::SECONDARY)
+            .command_buffer_count(1);
+        // SAFETY: the pool is alive.
+        let selection = unsafe { gpu.raw.allocate_command_buffers(&info)? }[0];
+        gpu.name(selection, "selection");
         let storage = Usage::STORAGE_BUFFER | Usage::TRANSFER_SRC;
         let parameters =
             Buffer::host(gpu, "selection parameters", 4 * driver.parameters as u64, Usage::STORAGE_BUFFER)?;
@@ -220,7 +253,7 @@ impl Slot {
         let found = Buffer::new(gpu, "selection read back", bytes, Usage::TRANSFER_DST, MemoryLocation::GpuToCpu)?;
         let bound = [table, &parameters, scratch, &instances, &commands].map(Bound::Storage);
         let bindings = Bindings::new(gpu, "selection", None, vk::ShaderStageFlags::COMPUTE, &bound, 4)?;
-        Ok(Self { bindings, parameters, instances, commands, found, has_run: false })
+        Ok(Self { selection, bindings, parameters, instances, commands, found, has_run: false })
     }
 }
 
@@ -229,6 +262,7 @@ impl Drop for Driven {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
+            self.gpu.raw.destroy_command_pool(self.pool, None);
             for pipeline in &self.pipelines {
                 self.gpu.raw.destroy_pipeline(*pipeline, None);
             }

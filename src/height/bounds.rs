@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::Field;
 use super::kept::Kept;
 use super::levels::{self, Patch};
+use super::progress::Progress;
 use super::surface;
 
 /// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
@@ -86,7 +87,7 @@ impl Square {
 
 impl Bounds {
     /// Measures a field, in parallel, or finds what was kept when it was measured before.
-    pub fn new(field: &Field, measure: Measure) -> Self {
+    pub fn new(field: &Field, measure: Measure, progress: &Progress) -> Self {
         let (stored, size) = (field.stored(), field.size());
         let period = [0, 1].map(|k| (size[k] > stored[k]).then_some(stored[k]));
         let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new() };
@@ -96,7 +97,9 @@ impl Bounds {
         if kept.as_ref().and_then(Kept::read).is_some_and(|content| bounds.fill(&content)) {
             return bounds;
         }
-        (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level));
+        // A level takes about as long as another: all its squares look at all samples.
+        progress.expect(bounds.levels.iter().map(|level| level.samples()).sum());
+        (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level, progress));
         kept.inspect(|kept| kept.write(&bounds.content()));
         bounds
     }
@@ -183,6 +186,18 @@ impl Bounds {
         self.tiled_square(level, at)
     }
 
+    /// The four squares in a square of the level above: those beyond the field have no land.
+    #[inline]
+    pub fn squares(&self, level: u32, [i, j]: [u32; 2]) -> [Square; 4] {
+        let (side, last) = (self.side(level), self.last);
+        let square = |i: u32, j: u32| {
+            let is_beyond = i * side >= last[0] || j * side >= last[1];
+            if is_beyond { Square::NOTHING } else { self.square(level, [i, j]) }
+        };
+        let (i, j) = (2 * i, 2 * j);
+        [square(i, j), square(i + 1, j), square(i, j + 1), square(i + 1, j + 1)]
+    }
+
     fn tiled_square(&self, level: u32, at: [u32; 2]) -> Square {
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);
@@ -204,11 +219,13 @@ impl Bounds {
         all
     }
 
-    fn measure_level(&mut self, field: &Field, level: u32) {
+    fn measure_level(&mut self, field: &Field, level: u32, progress: &Progress) {
         let Level { side, count, .. } = self.levels[level as usize];
         let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
             let first = [k % count[0], k / count[0]].map(|n| n * side);
-            self.measured(field, level, first)
+            let square = self.measured(field, level, first);
+            progress.advance(u64::from(side) * u64::from(side));
+            square
         });
         self.levels[level as usize].squares = squares.collect();
     }
@@ -253,6 +270,11 @@ impl Bounds {
 }
 
 impl Level {
+    /// Samples that its squares look at.
+    fn samples(&self) -> u64 {
+        [self.count[0], self.count[1], self.side, self.side].map(u64::from).iter().product()
+    }
+
     /// Which squares along an axis a length of samples touches: the first and how many, modulo their count.
     fn touched(&self, axis: usize, period: Option<u32>, first: u32, length: u32) -> (u32, u32) {
         let (side, count) = (self.side, self.count[axis]);
@@ -339,9 +361,19 @@ mod tests {
     }
 
     #[test]
+    fn progress_ends_at_its_end_and_not_before() {
+        let progress = Progress::default();
+        assert_eq!(progress.share(), None);
+        let bounds = Bounds::new(&rough([75, 52], 3), MEASURE, &progress);
+        assert_eq!(progress.share(), Some(1.0));
+        progress.expect(bounds.levels.iter().map(Level::samples).sum());
+        assert_eq!(progress.share(), Some(0.5));
+    }
+
+    #[test]
     fn errors_are_those_of_the_triangles() {
         let field = rough([75, 52], 3);
-        let bounds = Bounds::new(&field, MEASURE);
+        let bounds = Bounds::new(&field, MEASURE, &Progress::default());
         assert_eq!(bounds.levels(), 5);
         for (level, at) in squares(&bounds) {
             // Level 0 has none of its own.
@@ -389,7 +421,7 @@ mod tests {
         let way = slow_way(&field, 2, [0, 0]);
         assert!(ends.iter().all(|end| *end < 1.15) && way > 1.25, "{ends:?} {way}");
         for field in [field, rough([129, 97], 11)] {
-            let bounds = Bounds::new(&field, Measure { morph: true, ..MEASURE });
+            let bounds = Bounds::new(&field, Measure { morph: true, ..MEASURE }, &Progress::default());
             for (level, at) in squares(&bounds).into_iter().filter(|(level, _)| *level > 0) {
                 let (way, error) = (slow_way(&field, level, at), bounds.square(level, at).error);
                 assert!(error >= way * (1.0 - 1e-6), "level {level} at {at:?}: {error} m, on the way {way} m");
@@ -399,23 +431,26 @@ mod tests {
 
     #[test]
     fn what_was_kept_is_what_was_measured() {
-        let bounds = Bounds::new(&rough([75, 52], 3), MEASURE);
+        let bounds = Bounds::new(&rough([75, 52], 3), MEASURE, &Progress::default());
         let content = bounds.content();
-        let mut again = Bounds::new(&rough([75, 52], 4), MEASURE);
+        let mut again = Bounds::new(&rough([75, 52], 4), MEASURE, &Progress::default());
         assert_ne!(again.content(), content);
         assert!(again.fill(&content));
         squares(&bounds)
             .into_iter()
             .for_each(|(level, at)| assert_eq!(again.square(level, at), bounds.square(level, at)));
         assert!(!again.fill(&content[..content.len() - 1]));
-        assert!(!Bounds::new(&rough([75, 152], 3), MEASURE).fill(&content));
+        assert!(!Bounds::new(&rough([75, 152], 3), MEASURE, &Progress::default()).fill(&content));
     }
 
     #[test]
     fn what_is_known_of_a_tiled_field_holds_in_every_tile() {
         for (size, tiles) in [([41, 30], [3, 4]), ([32, 64], [3, 2]), ([33, 57], [4, 1]), ([16, 16], [9, 9])] {
             let field = rough(size, 9).tiled(tiles);
-            let (tiled, whole) = (Bounds::new(&field, MEASURE), Bounds::new(&held(&field), MEASURE));
+            let (tiled, whole) = (
+                Bounds::new(&field, MEASURE, &Progress::default()),
+                Bounds::new(&held(&field), MEASURE, &Progress::default()),
+            );
             assert!(tiled.bytes() < whole.bytes());
             for (level, at) in squares(&whole) {
                 let (general, exact) = (tiled.square(level, at), whole.square(level, at));

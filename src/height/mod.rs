@@ -14,6 +14,7 @@ mod kept;
 pub mod levels;
 mod load;
 mod png;
+pub mod progress;
 mod raster;
 mod raw;
 pub mod rtin;

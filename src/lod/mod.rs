@@ -7,6 +7,7 @@ pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
 pub mod smooth_tiles;
+pub mod sorted_strips;
 
 use std::sync::Arc;
 
@@ -104,7 +105,8 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, clusters::ENTRY, smooth_tiles::ENTRY];
+pub const TECHNIQUES: &[Entry] =
+    &[brute_force::ENTRY, geomipmap::ENTRY, smooth_tiles::ENTRY, sorted_strips::ENTRY, clusters::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

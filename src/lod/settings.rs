@@ -1,6 +1,7 @@
 //! What can be set on a technique: declared in its room, checked here once, read without failure.
 
 use super::Entry;
+use crate::height::progress::Progress;
 
 /// What a setting may be.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,8 @@ pub struct Setting {
 pub struct Settings {
     variant: Option<&'static str>,
     values: Vec<(&'static Setting, String)>,
+    /// How far the room has come with its preparation, if it says so.
+    pub progress: Progress,
 }
 
 impl Settings {
@@ -50,13 +53,13 @@ impl Settings {
             slot.0.check(value)?;
             slot.1 = value.clone();
         }
-        Ok(Self { variant: variant.map(|v| v.name), values })
+        Ok(Self { variant: variant.map(|v| v.name), values, progress: Progress::default() })
     }
 
     /// The defaults of `entry`.
     pub fn defaults(entry: &Entry) -> Self {
         let values = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
-        Self { variant: None, values }
+        Self { variant: None, values, progress: Progress::default() }
     }
 
     /// The variant chosen, if not the default one.

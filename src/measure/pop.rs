@@ -42,6 +42,9 @@ pub struct Pop {
     /// Exact: the smallest displacement, pixels, that 99 % of the samples do not exceed.
     #[serde(deserialize_with = "infinite_if_null")]
     pub p99_px: f64,
+    /// The same of 99.9 %.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub p999_px: f64,
     /// Largest displacement, pixels.
     #[serde(deserialize_with = "infinite_if_null")]
     pub max_px: f64,
@@ -65,6 +68,7 @@ pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
     Pop {
         samples: tally.count,
         p99_px: tally.quantile(),
+        p999_px: tally.quantile_above(1000),
         max_px: tally.largest,
         at: tally.largest_at.map(|place| place.sample),
         histogram,
@@ -222,6 +226,7 @@ mod tests {
         after.draws[0].indices = 0..12;
         let found = jump(&slab(SIDE, 3.0), &after);
         assert!((found.max_px - 50.0 * 0.5f64.sqrt()).abs() < 1e-9 && found.p99_px < 1e-9, "{found:?}");
+        assert!(found.p999_px >= found.p99_px && found.p999_px <= found.max_px, "{found:?}");
         assert_eq!(found.at, Some([0, 0]));
     }
 }

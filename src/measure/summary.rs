@@ -103,9 +103,15 @@ impl Tally {
 
     /// The smallest value that all but one of `denominator` counted ones do not exceed.
     pub fn quantile(&self) -> f64 {
+        self.quantile_above(self.denominator)
+    }
+
+    /// As [`Self::quantile`] with another denominator, not below its own.
+    pub fn quantile_above(&self, denominator: u64) -> f64 {
+        debug_assert!(denominator >= self.denominator);
         let mut top: Vec<u64> = self.top.iter().map(|value| value.0).collect();
         top.sort_unstable_by_key(|&bits| Reverse(bits));
-        top.get((self.count / self.denominator) as usize).map_or(0.0, |&bits| f64::from_bits(bits))
+        top.get((self.count / denominator) as usize).map_or(0.0, |&bits| f64::from_bits(bits))
     }
 
     /// With the quantile as 99.9th percentile.
@@ -135,6 +141,8 @@ mod tests {
             sorted.sort_by(f64::total_cmp);
             let rank = count - count / denominator;
             assert_eq!(whole.quantile(), sorted[rank as usize - 1], "{count} values");
+            let rank = count - count / 5000;
+            assert_eq!(whole.quantile_above(5000), sorted[rank as usize - 1], "{count} values");
             assert_eq!(whole.largest, sorted[count as usize - 1]);
         }
     }

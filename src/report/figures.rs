@@ -145,6 +145,7 @@ impl SceneFigures {
                     e.economy.as_ref().map(|economy| economy.pixels_per_triangle.as_slice())
                 }),
             ),
+            ("tolerance-time", tolerance_time(all.clone(), names)),
         ];
         let split = split(all);
         Self { name, charts, split }
@@ -170,6 +171,23 @@ fn error_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[
         y: axis("median frame time, ms", Scale::Logarithmic),
         series,
         guide,
+        limit: None,
+    }
+}
+
+fn tolerance_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[String]) -> Chart {
+    let point = |result: &CaseResult| {
+        let frame = result.time.as_ref()?.frame_ms;
+        let (x, interval) = (result.case.tolerance_px, Some([frame.low, frame.high]));
+        Some(Point { x, y: frame.value, interval, label: told(result), marked: false })
+    };
+    Chart {
+        title: "Frame time against tolerance".to_string(),
+        about: "What a promise costs, whatever the error then is. Whiskers: bootstrap 95 % intervals.".to_string(),
+        x: axis("error allowed, px", Scale::Logarithmic),
+        y: axis("median frame time, ms", Scale::Logarithmic),
+        series: grouped(cases, names, point),
+        guide: None,
         limit: None,
     }
 }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::html::number;
-use crate::bench::results::{CaseResult, Results};
+use crate::bench::results::{CaseResult, Results, frame_ratio};
+use crate::bench::statistics::Estimate;
 
 /// One published table.
 #[derive(Debug, Deserialize)]
@@ -49,6 +50,9 @@ pub struct Rule {
     path: Option<String>,
     /// Most that the 99th percentile of the peers' metric may be, pixels.
     peers_p99_px: Option<f64>,
+    /// What stands there is then how many times as fast as a case of this rule it is, at the same tolerance in the same
+    /// scene.
+    over: Option<Box<Rule>>,
 }
 
 /// Every published table.
@@ -71,6 +75,30 @@ impl Rule {
 
     /// Ours in words; `None` if no such case was run.
     pub fn ours(&self, results: &Results) -> Option<String> {
+        match &self.over {
+            Some(other) => self.speed_ups(other, results),
+            None => self.fastest(results),
+        }
+    }
+
+    /// How many times as fast as those of the other rule the cases are, one by one.
+    fn speed_ups(&self, other: &Rule, results: &Results) -> Option<String> {
+        let speed_up = |result: &CaseResult| {
+            let same = |slow: &&CaseResult| {
+                let (a, b) = (&slow.case, &result.case);
+                a.tolerance_px == b.tolerance_px && a.metric == b.metric && a.scene() == b.scene()
+            };
+            let slow = results.cases.iter().filter(|slow| other.allows(slow)).find(same)?;
+            let Estimate { value, low, high } = frame_ratio(slow, result)?;
+            let [value, low, high] = [value, low, high].map(number);
+            let (tolerance, fast, slow) = (number(result.case.tolerance_px), result.case.series(), slow.case.series());
+            Some(format!("{fast} against {slow}, {tolerance} px: {value} times as fast ({low}–{high})"))
+        };
+        let found: Vec<_> = results.cases.iter().filter(|result| self.allows(result)).filter_map(speed_up).collect();
+        (!found.is_empty()).then(|| found.join("\n"))
+    }
+
+    fn fastest(&self, results: &Results) -> Option<String> {
         let timed =
             results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)));
         let (result, time) = timed.min_by(|a, b| a.1.frame_ms.value.total_cmp(&b.1.frame_ms.value))?;

@@ -40,6 +40,8 @@ const TIMES: &[Column] = &[
     ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
     ("over base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
     ("over floor", |r| r.time.as_ref()?.over_floor.as_ref().map(estimate)),
+    ("CPU, ms", |r| r.time.as_ref().map(|t| estimate(&t.cpu_ms))),
+    ("CPU over base", |r| r.time.as_ref()?.cpu_over_base.as_ref().map(estimate)),
     ("p95, ms", |r| r.time.as_ref().map(|t| number(t.frame_p95_ms))),
     ("p99, ms", |r| r.time.as_ref().map(|t| number(t.frame_p99_ms))),
     ("max, ms", |r| r.time.as_ref().map(|t| number(t.frame_max_ms))),
@@ -63,6 +65,7 @@ const ERRORS: &[Column] = &[
     ("frames within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.frames))),
     ("samples within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.samples))),
     ("pop p99, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p99_px))),
+    ("pop 99.9 %, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p999_px))),
     ("FLIP", |r| r.errors.as_ref()?.image.map(|i| number(i.flip))),
     ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
     ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
@@ -75,7 +78,7 @@ pub fn cases(results: &Results, scene: &str) -> String {
     let cases: Vec<&CaseResult> = results.cases.iter().filter(|result| result.case.scene() == scene).collect();
     let base = escape(&results.header.base);
     format!(
-        "<h3>What every case took</h3><p class=\"conditions\">The base is {base}. Small: bootstrap 95 % intervals.</p>{}\
+        "<h3>What every case took</h3><p class=\"conditions\">The base is {base}, at the same tolerance where it has one. CPU: selection and recording. Small: bootstrap 95 % intervals.</p>{}\
          <h3>How wrong it was</h3>{}",
         of_cases(&cases, TIMES),
         of_cases(&cases, ERRORS)

@@ -95,6 +95,7 @@ impl Laboratory for Mock {
         errors.image = Some(ImageError { rmse: 0.01, psnr: f64::INFINITY, ssim: 0.99, flip: 0.02 });
         errors.pop = (!is_truth).then(|| Pop {
             p99_px: case.tolerance_px / 2.0,
+            p999_px: case.tolerance_px / 1.5,
             max_px: case.tolerance_px,
             histogram: (peak - 5..=peak).map(|k| bin(k, 4u64.pow((peak - k + 1) as u32))).collect(),
         });

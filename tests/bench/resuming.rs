@@ -92,6 +92,29 @@ fn cases_of_a_scene_take_turns_and_the_warm_up_is_dropped() {
 }
 
 #[test]
+fn the_base_is_that_of_the_same_tolerance() {
+    let fields = vec![mock::field(9)];
+    let of = |technique: &str, px: f64| mock::case(&fields[0].0, technique, px, "certified", "spin");
+    let cases: Vec<_> = [1.0, 8.0].iter().flat_map(|&px| [of("geomipmap", px), of("clusters", px)]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    mock::run(folder.path(), fields.clone(), cases, 3);
+    let (mut header, rows) = cuesta::bench::journal::read(folder.path()).unwrap();
+    header.base = "geomipmap".to_string();
+    let times: Vec<_> = Results::of(header, &rows).cases.into_iter().map(|case| case.time.unwrap()).collect();
+    for pair in times.chunks(2) {
+        assert_eq!((pair[0].over_base.unwrap().value, pair[0].cpu_over_base.unwrap().value), (1.0, 1.0));
+        assert_eq!(pair[0].triangles, pair[1].triangles);
+        for (ratio, of, over) in [
+            (pair[1].over_base, pair[1].frame_ms, pair[0].frame_ms),
+            (pair[1].cpu_over_base, pair[1].cpu_ms, pair[0].cpu_ms),
+        ] {
+            assert!((ratio.unwrap().value / (of.value / over.value) - 1.0).abs() < 0.05, "{ratio:?}");
+        }
+        assert!((pair[0].cpu_ms.value - pair[0].select_ms - pair[0].record_ms).abs() < 1e-9);
+    }
+}
+
+#[test]
 fn rows_of_another_run_are_refused_in_one_line() {
     let fields = vec![mock::field(9)];
     let cases = vec![mock::case(&fields[0].0, "geomipmap", 1.0, "certified", "spin")];

@@ -8,6 +8,7 @@ use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
 use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology, weights};
 use cuesta::height::bounds::{Bounds, Measure};
+use cuesta::height::progress::Progress;
 use cuesta::height::synth::{Kind, synth};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::Technique;
@@ -152,7 +153,8 @@ fn no_weights_exceed_the_error() {
     for _ in 0..20 {
         let field = rough_spots(&mut seed);
         let view = anywhere(&field, &mut seed);
-        let bounds = Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph: true });
+        let bounds =
+            Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph: true }, &Progress::default());
         for level in 1..4u32 {
             let nodes = 128 >> (3 + level);
             for (node, draw) in (0..nodes * nodes).flat_map(|node| (0..8).map(move |draw| (node, draw))) {

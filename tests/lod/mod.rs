@@ -4,6 +4,8 @@ mod clusters;
 mod morph;
 mod skirts;
 mod smooth_tiles;
+mod strips;
+mod strips_order;
 
 use std::sync::Arc;
 

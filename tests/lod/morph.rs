@@ -102,7 +102,6 @@ fn largest_jump(field: &Arc<Field>, name: &str, settings: &[&str]) -> f64 {
 /// Of a tolerance of 2 px.
 const JUMP_PX: f64 = 0.15;
 
-
 #[test]
 fn on_a_slow_way_nothing_jumps() {
     let field = land();

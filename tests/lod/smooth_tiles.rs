@@ -153,7 +153,8 @@ fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Tr
             assert_eq!(list.waiting, 0, "nothing waits any more");
             let frame_data = Frame::placing(field, view);
             let drawn = expand::triangles(field, &frame_data, technique.resident(), &list);
-            let mut triangles: Vec<Triangle> = drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect();
+            let mut triangles: Vec<Triangle> =
+                drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect();
             triangles.sort_unstable();
             return (triangles, frame);
         }

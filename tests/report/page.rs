@@ -65,8 +65,8 @@ fn the_figures_are_files_that_stand_alone() {
     let mut files: Vec<_> =
         fs::read_dir(folder.path().join(report::PLOTS)).unwrap().map(|e| e.unwrap().path()).collect();
     files.sort();
-    // Four charts and the split of each of four scenes, and two figures across them.
-    assert_eq!(files.len(), 22, "{files:?}");
+    // Five charts and the split of each of four scenes, and two figures across them.
+    assert_eq!(files.len(), 26, "{files:?}");
     for file in files {
         let text = fs::read_to_string(&file).unwrap();
         assert!(text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && text.contains("<style>"), "{file:?}");
@@ -87,6 +87,29 @@ fn from_rows_alone_the_page_is_the_same_but_for_pictures() {
     assert_eq!(charts(&page), charts(&again));
     for file in ["rows.jsonl", "index.html"] {
         assert!(other.path().join(file).is_file());
+    }
+}
+
+/// The mock's times follow its triangles: 0.9 of the samples' cells at 0 px, and half as many at 1 px.
+#[test]
+fn published_ratios_have_ours_of_the_same_tolerance_beside_them() {
+    let fields = vec![mock::field(65)];
+    let of = |technique: &str, block: &str, px: f64| {
+        let mut case = mock::case(&fields[0].0, technique, px, "certified", "skim");
+        case.settings.insert("block".to_string(), block.to_string());
+        case
+    };
+    let slow = ["32", "64"].map(|block| of("clusters:draw-per-block", block, 1.0));
+    let others = [of("clusters", "32", 1.0), of("clusters", "32", 3.0), of("clusters:draw-per-block", "32", 10.0)];
+    let folder = tempfile::tempdir().unwrap();
+    mock::run(folder.path(), fields.clone(), slow.into_iter().chain(others).collect(), 3);
+    let page = fs::read_to_string(report::write(folder.path()).expect("a page")).unwrap();
+    let told: Vec<&str> = page.match_indices("times as fast (").map(|(at, _)| &page[at - 90..at + 30]).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    for (told, block) in told.iter().zip([32, 64]) {
+        assert!(told.contains(&format!("against clusters:draw-per-block block={block}, 1 px: ")), "{told}");
+        let ratio = told.split(" px: ").nth(1).and_then(|text| text.split(' ').next()).unwrap();
+        assert!((0.9..1.1).contains(&ratio.parse::<f64>().unwrap()), "{told}");
     }
 }
 

@@ -37,12 +37,12 @@ impl Collapse<'_> {
     pub fn run(&self, drawn: &mut Vec<(u32, Instance)>) {
         if self.refinement.root == Found::Block {
             // A lone block is a quadrant of a parent that is not there.
-            drawn.push((0, self.block(self.sight.tree.root())));
+            drawn.push((0, self.lone_block(self.sight.tree.root())));
         }
         for split in &self.refinement.splits {
             if self.single {
                 let blocks = (0..4).filter(|quadrant| split.blocks >> quadrant & 1 == 1);
-                drawn.extend(blocks.map(|quadrant| (0, self.block(split.node.child(quadrant)))));
+                drawn.extend(blocks.map(|quadrant| (0, self.block_in(split, split.node.child(quadrant)))));
             } else {
                 self.push_cluster(split, drawn);
             }
@@ -73,25 +73,30 @@ impl Collapse<'_> {
         let instance = match &self.skirts {
             Some(skirts) => Instance { turns, ..self.skirted(skirts, node, level, blocks(node, state)) },
             None => {
-                let weights = self.weights(node, state);
+                let weights = self.weights(split, state);
                 Instance { turns, cells: 4 * self.cells, weights, ..self.placed(node, level) }
             }
         };
         drawn.push((seed as u32, instance));
     }
 
-    /// A block by itself: the first quadrant of a cluster, as if the cluster ended with it.
-    fn block(&self, node: Node) -> Instance {
-        let parent = node.parent();
+    /// The root as a block: the first quadrant of a parent that is not there.
+    fn lone_block(&self, root: Node) -> Instance {
+        match &self.skirts {
+            Some(skirts) => self.skirted(skirts, root, root.level, std::iter::once((0, root))),
+            None => Instance { cells: 2 * self.cells, ..self.placed(root, root.level) },
+        }
+    }
+
+    /// A block of a split node by itself: the first quadrant of a cluster, as if the cluster ended with it.
+    fn block_in(&self, split: &Split, node: Node) -> Instance {
         if let Some(skirts) = &self.skirts {
             return self.skirted(skirts, node, node.level, std::iter::once((0, node)));
         }
-        let weight = |node| self.refinement.weight(self.sight, node).unwrap_or(0);
-        let inside = if node == self.sight.tree.root() { 0 } else { weight(parent) };
+        let inside = split.weight(self.sight);
         let side = |side: usize| {
-            let sibling = node.beyond(side).is_some_and(|beyond| beyond.parent() == parent);
-            let root = node == self.sight.tree.root();
-            if sibling || root { inside } else { self.refinement.side_weight(self.sight, parent, side) }
+            let sibling = node.beyond(side).is_some_and(|beyond| beyond.parent() == split.node);
+            if sibling { inside } else { self.refinement.side_weight(self.sight, split, side) }
         };
         let weights = weights::uniform(inside, SIDES.map(side));
         Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
@@ -113,31 +118,40 @@ impl Collapse<'_> {
 
     /// The weights of a cluster in a node. Blocks go over into their parent: that of a single one is the cluster's
     /// node, that of four is their quadrant.
-    fn weights(&self, node: Node, state: State) -> [u32; 4] {
+    fn weights(&self, split: &Split, state: State) -> [u32; 4] {
         let mut weights = [0; 4];
-        let weight = |node| self.refinement.weight(self.sight, node).unwrap_or(0);
+        // Sides that two quadrants have in common are looked at once.
+        let mut sides = [None; 4];
         for quadrant in (0..4).filter(|&quadrant| state[quadrant as usize] != NOTHING) {
-            let fine = state[quadrant as usize] == FOUR_BLOCKS;
-            let parent = if fine { node.child(quadrant) } else { node };
-            let finer = if fine { FINER } else { 0 };
-            weights::set(&mut weights, weights::inside(quadrant as usize), weight(parent) | finer);
+            let fine = self.four_blocks(split, state, quadrant);
+            let inside = fine.unwrap_or(split).weight(self.sight) | if fine.is_some() { FINER } else { 0 };
+            weights::set(&mut weights, weights::inside(quadrant as usize), inside);
             for (slot, side) in outer_sides(quadrant) {
-                weights::set(&mut weights, slot, self.refinement.side_weight(self.sight, parent, side));
+                let weight = match fine {
+                    Some(fine) => self.refinement.side_weight(self.sight, fine, side),
+                    None => *sides[side].get_or_insert_with(|| self.refinement.side_weight(self.sight, split, side)),
+                };
+                weights::set(&mut weights, slot, weight);
             }
         }
-        for (byte, [first, second], side) in SEAMS {
-            weights::set(&mut weights, (3, byte), self.seam_weight(node, state, [first, second], side));
+        for (byte, quadrants, side) in SEAMS {
+            weights::set(&mut weights, (3, byte), self.seam_weight(split, state, quadrants, side));
         }
         weights
     }
 
+    /// The split node in a quadrant of four blocks.
+    fn four_blocks(&self, split: &Split, state: State, quadrant: u32) -> Option<&Split> {
+        let child = split.children[quadrant as usize].filter(|_| state[quadrant as usize] == FOUR_BLOCKS)?;
+        Some(&self.refinement.splits[child as usize])
+    }
+
     /// The weight between two quadrants: beside one of four blocks that of its side.
-    fn seam_weight(&self, node: Node, state: State, quadrants: [u32; 2], side: usize) -> u32 {
-        let fine = |k: usize| state[quadrants[k] as usize] == FOUR_BLOCKS;
-        let weight = match (fine(0), fine(1)) {
-            (true, _) => self.refinement.side_weight(self.sight, node.child(quadrants[0]), side),
-            (_, true) => self.refinement.side_weight(self.sight, node.child(quadrants[1]), side ^ 2),
-            _ => self.refinement.weight(self.sight, node).unwrap_or(0),
+    fn seam_weight(&self, split: &Split, state: State, quadrants: [u32; 2], side: usize) -> u32 {
+        let weight = match quadrants.map(|quadrant| self.four_blocks(split, state, quadrant)) {
+            [Some(fine), _] => self.refinement.side_weight(self.sight, fine, side),
+            [None, Some(fine)] => self.refinement.side_weight(self.sight, fine, side ^ 2),
+            _ => split.weight(self.sight),
         };
         if weight < ONE { weight } else { STITCHED }
     }

@@ -137,7 +137,8 @@ impl Clusters {
         let band_end = if morph { MORPH_RATIO } else { 1.0 };
         // A little more than the band is wide: no rounding puts two nodes over a place into theirs.
         let growth = if morph { band_end * 1.001 } else { 1.0 };
-        let tree = Tree::new(field, Measure { cells, growth, errors: measured, morph }, !measured);
+        let measure = Measure { cells, growth, errors: measured, morph };
+        let tree = Tree::new(field, measure, !measured, &settings.progress);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
         let mesh = Mesh::new(cells as i32, &seeds.states, seams);
         // A quadtree has at most three leaves more for each split node.

@@ -12,8 +12,8 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::sight::{Sight, WITHOUT_ERROR};
-use super::tree::{Node, Tree};
+use super::sight::{Look, Sight};
+use super::tree::{Node, Squares, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
 
@@ -24,8 +24,8 @@ pub struct Split {
     pub node: Node,
     /// What the tolerance allows over its ε.
     ratio: f32,
-    /// Whether all of it is in sight for certain.
-    is_inside: bool,
+    /// How it lies to what can be seen.
+    containment: Containment,
     /// Which of its children are blocks in sight, a bit each.
     pub blocks: u32,
     /// Those of its children that are split, by their place among the split nodes.
@@ -52,6 +52,8 @@ pub struct Refinement {
     /// Their places by level.
     levels: Vec<Vec<u32>>,
     index: HashMap<u64, u32, BuildHasherDefault<NodeHasher>>,
+    /// What is known of the children of a level's split nodes.
+    squares: Vec<Squares>,
     /// What the root is.
     pub root: Found,
 }
@@ -59,7 +61,8 @@ pub struct Refinement {
 impl Refinement {
     /// With at most `most` split nodes.
     pub fn new(most: usize) -> Self {
-        Self { most, splits: Vec::new(), levels: Vec::new(), index: HashMap::default(), root: Found::Nothing }
+        let (splits, levels, index, squares) = (Vec::new(), Vec::new(), HashMap::default(), Vec::new());
+        Self { most, splits, levels, index, squares, root: Found::Nothing }
     }
 
     /// Finds the split nodes of a view. `false` if there would be too many.
@@ -69,7 +72,7 @@ impl Refinement {
         self.levels.iter_mut().for_each(Vec::clear);
         self.splits.clear();
         self.index.clear();
-        self.root = look(sight, root, Containment::Crossing).map_or(Found::Nothing, |seen| self.descend(sight, seen));
+        self.descend(sight);
         for level in 1..root.level as usize {
             for k in 0..self.levels[level].len() {
                 let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
@@ -79,19 +82,39 @@ impl Refinement {
         self.splits.len() <= self.most
     }
 
-    /// What a node is that was looked at, and all that is in it.
-    fn descend(&mut self, sight: &Sight, seen: Seen) -> Found {
-        if seen.ratio >= sight.view.band_end || self.splits.len() > self.most {
-            return block(is_in_sight(sight, seen.node, seen.containment));
+    /// Splits what has to be, level by level.
+    fn descend(&mut self, sight: &Sight) {
+        let root = sight.tree.root();
+        self.root = self.found(sight, root, sight.look(root));
+        for level in (1..=root.level as usize).rev() {
+            // All of a level before any is looked at: what is far away in memory comes at the same time.
+            self.squares.clear();
+            let nodes = self.levels[level].iter().map(|&k| self.splits[k as usize].node);
+            self.squares.extend(nodes.map(|node| sight.tree.squares(node)));
+            for n in 0..self.levels[level].len() {
+                self.look_into(sight, self.levels[level][n], self.squares[n]);
+            }
         }
-        let k = self.insert(sight, seen.node, seen.ratio, seen.containment);
-        // All four at once: none waits for another.
-        let look = |quadrant| look(sight, seen.node.child(quadrant), seen.containment);
-        for (quadrant, child) in [look(0), look(1), look(2), look(3)].into_iter().enumerate() {
-            let found = child.map_or(Found::Nothing, |child| self.descend(sight, child));
+    }
+
+    fn look_into(&mut self, sight: &Sight, k: u32, squares: Squares) {
+        let Split { node, containment, .. } = self.splits[k as usize];
+        for (quadrant, look) in sight.look_in(node, containment, &squares).into_iter().enumerate() {
+            let found = self.found(sight, node.child(quadrant as u32), look);
             self.splits[k as usize].hold(quadrant, found);
         }
-        Found::Split(k)
+    }
+
+    /// What a node is that was looked at.
+    fn found(&mut self, sight: &Sight, node: Node, look: Look) -> Found {
+        let Some((containment, ratio)) = look else { return Found::Nothing };
+        if containment == Containment::Outside && sight.view.culls != 0 {
+            return Found::Nothing;
+        }
+        if ratio >= sight.view.band_end || self.splits.len() > self.most {
+            return block(is_in_sight(sight, node, containment));
+        }
+        Found::Split(self.insert(sight, node, ratio, containment))
     }
 
     fn insert(&mut self, sight: &Sight, node: Node, ratio: f32, containment: Containment) -> u32 {
@@ -100,8 +123,7 @@ impl Refinement {
             self.index.insert(id, k);
         }
         self.levels[node.level as usize].push(k);
-        let is_inside = containment == Containment::Inside;
-        self.splits.push(Split { node, ratio, is_inside, blocks: 0, children: [None; 4] });
+        self.splits.push(Split { node, ratio, containment, blocks: 0, children: [None; 4] });
         k
     }
 
@@ -139,44 +161,45 @@ impl Refinement {
     }
 
     fn is_leaf_in_sight(&self, sight: &Sight, node: Node) -> bool {
-        let Some(square) = sight.tree.square(node) else { return false };
-        is_in_sight(sight, node, sight.containment(&sight.extent(node, square.range)))
-    }
-
-    #[inline]
-    fn is_inside(&self, sight: &Sight, node: Node) -> bool {
-        self.find(sight.tree, node).is_some_and(|k| self.splits[k as usize].is_inside)
+        sight.containment(node).is_some_and(|containment| is_in_sight(sight, node, containment))
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
         self.index.get(&node.id(tree.root())?).copied()
     }
 
-    /// How far the blocks in a split node have gone over into it, below [`ONE`]; `None` if it is not split. Where
-    /// a node sticks out of the field midpoints are none, so there they stay.
+    /// How far the blocks in a node have gone over into it, below [`ONE`]; `None` if it is not split.
     pub fn weight(&self, sight: &Sight, node: Node) -> Option<u32> {
         let k = self.find(sight.tree, node)?;
-        let part = (self.splits[k as usize].ratio - 1.0) * sight.view.band_scale;
-        let stays = sight.view.band_scale == 0.0 || sight.tree.is_partial(node);
-        Some(if stays { 0 } else { part.clamp(0.0, (ONE - 1) as f32) as u32 })
+        Some(self.splits[k as usize].weight(sight))
     }
 
     /// The weight of a side of a split node, the greater of its two nodes': from [`ONE`] on the other one is not
     /// split, and `ONE` stands for its own level. Where nothing is drawn beyond, the node's own.
-    pub fn side_weight(&self, sight: &Sight, node: Node, side: usize) -> u32 {
-        let own = self.weight(sight, node).unwrap_or(0);
-        let Some(beyond) = node.beyond(side) else { return own };
+    pub fn side_weight(&self, sight: &Sight, split: &Split, side: usize) -> u32 {
+        let own = split.weight(sight);
+        let Some(beyond) = split.node.beyond(side) else { return own };
         match self.weight(sight, beyond) {
             Some(weight) => own.max(weight),
             // Where all of a node is in sight, so is the side that the other one shares with it.
             None if sight.tree.square(beyond).is_none() => own,
-            None if !self.is_inside(sight, node) && !sight.draws(beyond) => own,
+            None if split.containment != Containment::Inside && !sight.draws(beyond) => own,
+            None if sight.view.band_scale == 0.0 => ONE,
             None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
         }
     }
 }
 
 impl Split {
+    /// How far its blocks have gone over into it, below [`ONE`]. Where a node sticks out of the field midpoints are
+    /// none, so there they stay.
+    pub fn weight(&self, sight: &Sight) -> u32 {
+        if sight.view.band_scale == 0.0 || sight.tree.is_partial(self.node) {
+            return 0;
+        }
+        ((self.ratio - 1.0) * sight.view.band_scale).clamp(0.0, (ONE - 1) as f32) as u32
+    }
+
     fn hold(&mut self, quadrant: usize, found: Found) {
         self.blocks &= !(1 << quadrant);
         match found {
@@ -185,27 +208,6 @@ impl Split {
             Found::Split(place) => self.children[quadrant] = Some(place),
         }
     }
-}
-
-/// A node, how it lies to what can be seen, and what the tolerance allows over its ε.
-struct Seen {
-    node: Node,
-    containment: Containment,
-    ratio: f32,
-}
-
-/// Looks at a node in one that lies to what can be seen as `around` says. `None`: nothing of it is drawn.
-#[inline]
-fn look(sight: &Sight, node: Node, around: Containment) -> Option<Seen> {
-    let square = sight.tree.square(node)?;
-    let extent = sight.extent(node, square.range);
-    // What is in a node lies no other way than that, if it is not crossed by a plane.
-    let containment = if around == Containment::Crossing { sight.containment(&extent) } else { around };
-    if containment == Containment::Outside && sight.view.culls != 0 {
-        return None;
-    }
-    let ratio = if node.level > 0 { sight.ratio(&extent, square.error) } else { WITHOUT_ERROR };
-    Some(Seen { node, containment, ratio })
 }
 
 fn block(is_seen: bool) -> Found {
@@ -220,12 +222,9 @@ fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
         Containment::Inside => true,
         Containment::Crossing => {
             node.level == 0
-                || (0..4).any(|quadrant| {
-                    let child = node.child(quadrant);
-                    sight.tree.square(child).is_some_and(|square| {
-                        is_in_sight(sight, child, sight.containment(&sight.extent(child, square.range)))
-                    })
-                })
+                || (0u32..)
+                    .zip(sight.contained_in(node))
+                    .any(|(quadrant, containment)| is_in_sight(sight, node.child(quadrant), containment))
         }
     }
 }

@@ -7,13 +7,15 @@
 //!
 //! What is rounded errs on the safe side. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves and a sum
 //! along a direction by 12 u of its terms, which [`SLACK`] covers. The ratio is at most 80 u and twice what
-//! [`inverse_root`] lacks above the true one, less than 2⁻¹⁶: [`GUARD`] takes four times that off.
+//! [`inverse_roots`] lacks above the true one, less than 2⁻¹⁶: [`GUARD`] takes four times that off.
 //!
 //! A node in another is in sight only if that is, rounding included: every step is monotone in the node's corners.
+//!
+//! The host looks at the four children of a node at once, a lane each.
 
-use glam::Vec3;
+use glam::Vec4;
 
-use super::tree::{Node, Tree};
+use super::tree::{Node, Squares, Tree};
 use crate::draw::layout::ClusterView;
 use crate::draw::place::Anchor;
 use crate::height::bounds::Square;
@@ -45,127 +47,181 @@ pub struct Sight<'a> {
     pub tree: &'a Tree,
     /// The view, as the device gets it too.
     pub view: ClusterView,
-    planes: [(Vec3, f32); 5],
 }
 
-/// A box relative to the eye, metres.
+/// Four boxes relative to the eye, metres, a lane each: x, y and z.
 #[derive(Clone, Copy, Debug)]
-pub struct Extent {
-    /// Smallest corner.
-    pub low: Vec3,
-    /// Largest corner.
-    pub high: Vec3,
+struct Extents {
+    low: [Vec4; 3],
+    high: [Vec4; 3],
 }
+
+/// What is looked at of one node: its containment and its ratio, or nothing if it has no land.
+pub type Look = Option<(Containment, f32)>;
 
 impl<'a> Sight<'a> {
     /// A view whose tolerance has a band from 1 to `band_end`. `culls`: nodes out of sight are left as they are; else
     /// they are not, so that no turn of the eye changes what is seen.
     pub fn new(tree: &'a Tree, view: &View, band_end: f32, culls: bool) -> Self {
-        let view = cluster_view(tree, view, band_end, culls);
-        let planes = [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane];
-        Self { tree, view, planes: planes.map(|[x, y, z, w]| (Vec3::new(x, y, z), w)) }
+        Self { tree, view: cluster_view(tree, view, band_end, culls) }
     }
 
     /// Whether a node has land, in sight if that matters.
     pub fn draws(&self, node: Node) -> bool {
-        let in_sight = |square: Square| {
-            self.view.culls == 0 || self.containment(&self.extent(node, square.range)) != Containment::Outside
-        };
-        self.tree.square(node).is_some_and(in_sight)
+        self.tree.square(node).is_some()
+            && (self.view.culls == 0 || self.containment(node).is_some_and(|found| found != Containment::Outside))
     }
 
-    /// The box around a node with heights in a range.
+    /// How a node lies to what can be seen, `Crossing` when in doubt; `None` if it has no land.
+    pub fn containment(&self, node: Node) -> Option<Containment> {
+        let square = self.tree.square(node)?;
+        Some(self.contained(&self.extent(node, square))[0])
+    }
+
+    /// What the tolerance allows in a node over an error: below 1 that is too coarse. Never above the exact value.
+    /// `None` if it has no land.
+    pub fn ratio(&self, node: Node, error: f32) -> Option<f32> {
+        let square = self.tree.square(node)?;
+        Some(self.ratios(&self.extent(node, square), Vec4::splat(error)).x)
+    }
+
+    /// A node by itself.
+    pub fn look(&self, node: Node) -> Look {
+        let square = self.tree.square(node)?;
+        let extent = self.extent(node, square);
+        let finest = node.level == 0;
+        let ratio = if finest { WITHOUT_ERROR } else { self.ratios(&extent, Vec4::splat(square.error)).x };
+        Some((self.contained(&extent)[0], ratio))
+    }
+
+    /// The children of a node that lies to what can be seen as `around` says: `squares` is what is known of them.
     #[inline]
-    pub fn extent(&self, node: Node, [low, high]: [f32; 2]) -> Extent {
+    pub fn look_in(&self, node: Node, around: Containment, squares: &Squares) -> [Look; 4] {
+        let extents = self.children(node, squares);
+        // What is in a node lies no other way than that, if it is not crossed by a plane.
+        let contained = if around == Containment::Crossing { self.contained(&extents) } else { [around; 4] };
+        let finest = node.level == 1;
+        let ratios = if finest { Vec4::splat(WITHOUT_ERROR) } else { self.ratios(&extents, squares.error) };
+        let (has_land, ratios) = (squares.has_land(), ratios.to_array());
+        let look = |k: usize| (has_land >> k & 1 == 1).then(|| (contained[k], ratios[k]));
+        [look(0), look(1), look(2), look(3)]
+    }
+
+    /// How the children of a node lie to what can be seen; nothing without land does.
+    pub fn contained_in(&self, node: Node) -> [Containment; 4] {
+        let squares = self.tree.squares(node);
+        let (has_land, contained) = (squares.has_land(), self.contained(&self.children(node, &squares)));
+        [0, 1, 2, 3].map(|k| if has_land >> k & 1 == 1 { contained[k] } else { Containment::Outside })
+    }
+
+    /// The boxes around the children of a node.
+    #[inline]
+    fn children(&self, node: Node, squares: &Squares) -> Extents {
+        let (first, side) = (self.tree.first(node), self.tree.bounds.side(node.level - 1));
+        let metres = |axis: usize, n: u32| self.metres((first[axis] + n * side).min(self.tree.last[axis]), axis);
+        let [x, z] = [0, 1].map(|axis| [metres(axis, 0), metres(axis, 1), metres(axis, 2)]);
+        let [low, high] = squares.range.map(|heights| self.above(heights));
+        Extents {
+            low: [Vec4::new(x[0], x[1], x[0], x[1]), low, Vec4::new(z[0], z[0], z[1], z[1])],
+            high: [Vec4::new(x[1], x[2], x[1], x[2]), high, Vec4::new(z[1], z[1], z[2], z[2])],
+        }
+    }
+
+    /// The box around a node in every lane.
+    fn extent(&self, node: Node, Square { range: [low, high], .. }: Square) -> Extents {
+        let at = |[x, z]: [u32; 2], y: f32| {
+            [Vec4::splat(self.metres(x, 0)), self.above(Vec4::splat(y)), Vec4::splat(self.metres(z, 1))]
+        };
         let [first, end] = self.tree.corners(node);
-        Extent { low: self.corner(first, low), high: self.corner(end, high) }
+        Extents { low: at(first, low), high: at(end, high) }
+    }
+
+    /// Where a sample lies relative to the eye along an axis of the plan, metres.
+    #[inline]
+    fn metres(&self, at: u32, axis: usize) -> f32 {
+        let metres = (at as i32 - self.view.anchor[axis]) as f32 * self.view.spacing[axis];
+        (metres + self.view.anchor_relative[axis]).clamp(-FARTHEST, FARTHEST)
+    }
+
+    /// Heights relative to the eye, metres.
+    #[inline]
+    fn above(&self, heights: Vec4) -> Vec4 {
+        let above = (heights - self.view.anchor_height) + self.view.anchor_height_relative;
+        above.max(Vec4::splat(-FARTHEST)).min(Vec4::splat(FARTHEST))
     }
 
     #[inline]
-    fn corner(&self, at: [u32; 2], height: f32) -> Vec3 {
+    fn contained(&self, extents: &Extents) -> [Containment; 4] {
         let view = &self.view;
-        let along = |k: usize| {
-            let metres = (at[k] as i32 - view.anchor[k]) as f32 * view.spacing[k];
-            metres + view.anchor_relative[k]
-        };
-        let above = (height - view.anchor_height) + view.anchor_height_relative;
-        Vec3::new(along(0), above, along(1)).max(Vec3::splat(-FARTHEST)).min(Vec3::splat(FARTHEST))
-    }
-
-    /// How a box lies to what can be seen; `Crossing` when in doubt.
-    #[inline]
-    pub fn containment(&self, extent: &Extent) -> Containment {
-        let mut containment = Containment::Inside;
-        for (normal, w) in self.planes {
-            let [least, most, size] = along(normal, extent);
+        let (mut outside, mut crossing) = (0, 0);
+        for [x, y, z, w] in [view.near_plane, view.right_plane, view.left_plane, view.upper_plane, view.lower_plane] {
+            let [least, most, size] = along([x, y, z], extents);
             let slack = SLACK * (size + w.abs());
-            if (most + w) + slack < 0.0 {
-                return Containment::Outside;
-            }
-            if (least + w) - slack < 0.0 {
-                containment = Containment::Crossing;
-            }
+            outside |= ((most + w) + slack).cmplt(Vec4::ZERO).bitmask();
+            crossing |= ((least + w) - slack).cmplt(Vec4::ZERO).bitmask();
         }
-        containment
+        [0, 1, 2, 3].map(|k| match (outside >> k & 1, crossing >> k & 1) {
+            (1, _) => Containment::Outside,
+            (_, 1) => Containment::Crossing,
+            _ => Containment::Inside,
+        })
     }
 
-    /// What the tolerance allows in a box over an error: below 1 that is too coarse. Never above the exact value.
     #[inline]
-    pub fn ratio(&self, extent: &Extent, error: f32) -> f32 {
-        if error == 0.0 {
-            return WITHOUT_ERROR;
-        }
+    fn ratios(&self, extents: &Extents, errors: Vec4) -> Vec4 {
         let view = &self.view;
-        let distance = distance(extent).max(view.near);
+        let near = Vec4::splat(view.near);
+        let distance = distance(extents).max(near);
         let (over, under) = match view.metric {
             CERTIFIED => {
-                let [nearest, _, size] = along(view.forward.into(), extent);
-                let depth = (nearest - SLACK * size).max(distance * view.inverse_corner).max(view.near).min(DEEPEST);
-                let aside = farthest_aside(extent).min(view.corner * depth);
+                let [nearest, _, size] = along(view.forward, extents);
+                let depth = (nearest - SLACK * size).max(distance * view.inverse_corner).max(near);
+                let depth = depth.min(Vec4::splat(DEEPEST));
+                let aside = farthest_aside(extents).min(view.corner * depth);
                 (depth * depth, view.scale * aside + view.lean * depth)
             }
-            PAPER => (distance.min(DEEPEST), view.scale),
-            _ => (1.0, view.scale),
+            PAPER => (distance.min(Vec4::splat(DEEPEST)), Vec4::splat(view.scale)),
+            _ => (Vec4::ONE, Vec4::splat(view.scale)),
         };
-        let root = inverse_root((under * error.max(LEAST_ERROR)).max(LEAST));
-        ((GUARD * over) * root) * root
+        let root = inverse_roots((under * errors.max(Vec4::splat(LEAST_ERROR))).max(Vec4::splat(LEAST)));
+        let ratios = ((GUARD * over) * root) * root;
+        Vec4::select(errors.cmpeq(Vec4::ZERO), Vec4::splat(WITHOUT_ERROR), ratios)
     }
 }
 
 /// 1 / √x, never above it, and at most 5 · 10⁻⁶ below. The start is that of Lomont, "Fast Inverse Square Root" (2003).
 #[inline]
-pub fn inverse_root(x: f32) -> f32 {
-    let start = f32::from_bits(0x5f37_5a86 - (x.to_bits() >> 1));
-    let newton = |y: f32| y * (1.5 - (0.5 * x) * (y * y));
-    newton(newton(start))
+fn inverse_roots(x: Vec4) -> Vec4 {
+    let start = |x: f32| f32::from_bits(0x5f37_5a86_u32.wrapping_sub(x.to_bits() >> 1));
+    let newton = |y: Vec4| y * (1.5 - (0.5 * x) * (y * y));
+    newton(newton(Vec4::new(start(x.x), start(x.y), start(x.z), start(x.w))))
 }
 
-/// Distance of a box from the eye.
+/// Distances of boxes from the eye.
 #[inline]
-fn distance(extent: &Extent) -> f32 {
-    let away = extent.low.max(-extent.high).max(Vec3::ZERO);
-    let square = sum(away * away).max(LEAST);
-    square * inverse_root(square)
+fn distance(extents: &Extents) -> Vec4 {
+    let away = |k: usize| extents.low[k].max(-extents.high[k]).max(Vec4::ZERO);
+    let [x, y, z] = [away(0), away(1), away(2)];
+    let square = ((x * x + y * y) + z * z).max(Vec4::splat(LEAST));
+    square * inverse_roots(square)
 }
 
-/// Largest horizontal distance of a box from the eye.
+/// Largest horizontal distances of boxes from the eye.
 #[inline]
-fn farthest_aside(extent: &Extent) -> f32 {
-    let far = extent.low.abs().max(extent.high.abs());
-    let square = (far.x * far.x + far.z * far.z).max(LEAST);
-    square * inverse_root(square)
+fn farthest_aside(extents: &Extents) -> Vec4 {
+    let far = |k: usize| extents.low[k].abs().max(extents.high[k].abs());
+    let [x, z] = [far(0), far(2)];
+    let square = (x * x + z * z).max(Vec4::splat(LEAST));
+    square * inverse_roots(square)
 }
 
-/// The least and the greatest `direction · p` over a box, and how great its terms may be.
+/// The least and the greatest `direction · p` over each box, and how great its terms may be.
 #[inline]
-fn along(direction: Vec3, extent: &Extent) -> [f32; 3] {
-    let (a, b) = (direction * extent.low, direction * extent.high);
-    [sum(a.min(b)), sum(a.max(b)), sum(a.abs().max(b.abs()))]
-}
-
-#[inline]
-fn sum(terms: Vec3) -> f32 {
-    (terms.x + terms.y) + terms.z
+fn along(direction: [f32; 3], extents: &Extents) -> [Vec4; 3] {
+    let ends = |k: usize| (direction[k] * extents.low[k], direction[k] * extents.high[k]);
+    let [x, y, z] = [ends(0), ends(1), ends(2)];
+    let sum = |of: fn(Vec4, Vec4) -> Vec4| (of(x.0, x.1) + of(y.0, y.1)) + of(z.0, z.1);
+    [sum(Vec4::min), sum(Vec4::max), sum(|a, b| a.abs().max(b.abs()))]
 }
 
 /// A value as both sides may compute with it.
@@ -219,6 +275,7 @@ mod tests {
 
     use super::*;
     use crate::height::bounds::Measure;
+    use crate::height::progress::Progress;
     use crate::height::{Field, Holes, Samples};
     use crate::view::{Aabb, Tolerance};
 
@@ -235,7 +292,7 @@ mod tests {
             let mut field = Field::new(Samples::F32(heights(seed)), [64, 64], spacing, Holes::none(64 * 64));
             field.origin = origin;
             let measure = Measure { cells: 8, growth: 1.0, errors: true, morph: false };
-            Tree::new(&Arc::new(field.tiled(tiles)), measure, false)
+            Tree::new(&Arc::new(field.tiled(tiles)), measure, false, &Progress::default())
         };
         vec![
             tree([1, 1], [1.0, 1.0], [0.0, 0.0]),
@@ -298,16 +355,16 @@ mod tests {
                 let sight = Sight::new(&tree, &view, 1.0, true);
                 let node = any_node(&tree, &view, &mut seed);
                 let Some(square) = tree.square(node) else { continue };
-                let (extent, exact) = (sight.extent(node, square.range), world_box(&tree, node, square.range));
+                let exact = world_box(&tree, node, square.range);
                 let error = 10f32.powf(6.0 * random(&mut seed) as f32 - 4.0);
-                let allowed = f64::from(sight.ratio(&extent, error)) * f64::from(error);
+                let allowed = f64::from(sight.ratio(node, error).unwrap()) * f64::from(error);
                 let share = allowed / view.allowed_error(&exact).min(1e12);
                 assert!(share < 1.0, "{share} of the allowed error at {node:?}, {view:?}");
                 closest = closest.max(share);
                 // Where a box is much wider than it is far, a sum along the view axis is good for little.
                 let wide = (exact.max - exact.min).length() > 1000.0 * exact.distance(view.eye).max(view.near);
                 farthest = if wide { farthest } else { farthest.min(share) };
-                let (found, truly) = (sight.containment(&extent), view.frustum().contains(&exact));
+                let (found, truly) = (sight.containment(node).unwrap(), view.frustum().contains(&exact));
                 let doubtful = found == Containment::Crossing && truly != found;
                 assert!(found == truly || doubtful, "{found:?}, truly {truly:?}: {node:?}, {view:?}");
                 far_of_sight[usize::from(doubtful)] += 1;
@@ -319,10 +376,36 @@ mod tests {
     }
 
     #[test]
+    fn children_are_seen_as_by_themselves() {
+        let mut seed = 5;
+        let mut seen = [0; 3];
+        for tree in trees(&mut seed) {
+            for _ in 0..20_000 {
+                let view = anywhere(&tree, &mut seed);
+                let sight = Sight::new(&tree, &view, 1.0, true);
+                let node = any_node(&tree, &view, &mut seed);
+                if node.level == 0 {
+                    continue;
+                }
+                let alone = [0, 1, 2, 3].map(|quadrant| sight.look(node.child(quadrant)));
+                assert_eq!(
+                    sight.look_in(node, Containment::Crossing, &tree.squares(node)),
+                    alone,
+                    "{node:?}, {view:?}"
+                );
+                let outside = Containment::Outside;
+                assert_eq!(sight.contained_in(node), alone.map(|look| look.map_or(outside, |(found, _)| found)));
+                alone.iter().flatten().for_each(|(found, _)| seen[*found as usize] += 1);
+            }
+        }
+        assert!(seen.iter().all(|&count| count > 1000), "{seen:?}");
+    }
+
+    #[test]
     fn inverse_roots_are_below_and_close() {
         for k in 0..370_000u32 {
             let x = f32::from_bits(0x2000_0000 + 3571 * k);
-            let share = f64::from(inverse_root(x)) * f64::from(x).sqrt();
+            let share = f64::from(inverse_roots(Vec4::splat(x)).x) * f64::from(x).sqrt();
             assert!((1.0 - 5e-6..1.0 + 3e-7).contains(&share), "{share} of 1 / sqrt({x})");
         }
     }

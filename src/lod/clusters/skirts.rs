@@ -78,7 +78,7 @@ impl<'a> Skirts<'a> {
         let [_, apart] = tree.deviation(block);
         let gap = (own.error_m + other.error_m).min(apart) + ROUNDING * low.abs().max(high.abs());
         // What is allowed over an error of 1 m.
-        let allowed = self.raster.ratio(&self.raster.extent(block, [low, high]), 1.0);
+        let allowed = self.raster.ratio(block, 1.0)?;
         Some((gap + allowed.min(tree.cell_m(block.level) as f32)).next_up())
     }
 

@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use glam::Vec4;
+
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure, Square};
+use crate::height::progress::Progress;
 
 /// A square of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +69,23 @@ pub enum Errors {
     Halved(f32),
 }
 
+/// Four squares, a lane each, as [`Square`] has them.
+#[derive(Clone, Copy, Debug)]
+pub struct Squares {
+    /// Errors, metres.
+    pub error: Vec4,
+    /// Lowest and highest samples, metres.
+    pub range: [Vec4; 2],
+}
+
+impl Squares {
+    /// Which of them have land, a bit each.
+    #[inline]
+    pub fn has_land(&self) -> u32 {
+        self.range[0].cmple(self.range[1]).bitmask()
+    }
+}
+
 /// The quadtree of a field.
 pub struct Tree {
     /// What was measured of its squares.
@@ -81,8 +101,8 @@ pub struct Tree {
 
 impl Tree {
     /// Measures a field for blocks of `measure.cells` × `measure.cells` cells.
-    pub fn new(field: &Arc<Field>, measure: Measure, halved: bool) -> Self {
-        let bounds = Bounds::new(field, measure);
+    pub fn new(field: &Arc<Field>, measure: Measure, halved: bool, progress: &Progress) -> Self {
+        let bounds = Bounds::new(field, measure, progress);
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
         let errors = if halved { Errors::Halved((high - low).max(0.0)) } else { Errors::Measured };
         let last = field.size().map(|n| n - 1);
@@ -132,6 +152,18 @@ impl Tree {
         }
         let square = self.bounds.square(node.level, node.at);
         square.has_land().then(|| Square { error: self.error(node.level, square.error), ..square })
+    }
+
+    /// What is known of a node's children, a lane each.
+    #[inline]
+    pub fn squares(&self, node: Node) -> Squares {
+        let [a, b, c, d] = self.bounds.squares(node.level - 1, node.at);
+        let lanes = |of: fn(&Square) -> f32| Vec4::new(of(&a), of(&b), of(&c), of(&d));
+        let error = match self.errors {
+            Errors::Measured => lanes(|square| square.error),
+            Errors::Halved(_) => Vec4::splat(self.error(node.level - 1, 0.0)),
+        };
+        Squares { error, range: [lanes(|square| square.range[0]), lanes(|square| square.range[1])] }
     }
 
     /// The most, metres, by which a node's surface is off the samples, whatever its error is taken for, and the

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::measure::{Block, Shape};
 use crate::height::Field;
+use crate::height::progress::Progress;
 use crate::view::{Aabb, Containment, Frustum};
 
 /// All blocks of a field, and the quadtree over them.
@@ -33,15 +34,18 @@ struct Level {
 
 impl Blocks {
     /// Measures a field whose blocks morph, or do not.
-    pub fn new(field: &Field, cells: i32, morph: bool) -> Self {
+    pub fn new(field: &Field, cells: i32, morph: bool, progress: &Progress) -> Self {
         let levels = cells.ilog2() + 1;
         let count = field.size().map(|n| (n - 1).div_ceil(cells as u32));
         let shapes: Vec<_> = (0..levels).map(|level| Shape::up_to(cells, level, morph)).collect();
+        progress.expect(u64::from(count[0] * count[1]));
         let (ranges, errors): (Vec<_>, Vec<_>) = (0..count[0] * count[1])
             .into_par_iter()
             .map(|k| {
                 let block = Block::new(field, cells, [k % count[0], k / count[0]].map(|n| n as i32));
-                (block.range_of_land(), block.errors(&shapes))
+                let measured = (block.range_of_land(), block.errors(&shapes));
+                progress.advance(1);
+                measured
             })
             .unzip();
         let mut tree = vec![Level { count, ranges }];

@@ -100,7 +100,7 @@ impl GeoMipMap {
         let masks = if settings.word("masks") == "16" { Masks::Sixteen } else { Masks::Six };
         let bytes = |masks| size_of_val(BlockMesh::new(cells, masks).geometry.indices.as_slice());
         Self {
-            blocks: Blocks::new(field, cells, morph),
+            blocks: Blocks::new(field, cells, morph, &settings.progress),
             mesh: BlockMesh::new(cells, masks),
             masks,
             distance: match settings.word("distance") {

@@ -1,0 +1,289 @@
+//! How far the quads of each level are from the samples, before any view.
+//!
+//! A square of level l is drawn as one quad, with or without middles on its sides, or as half of a pair that matches a
+//! coarser quad: whatever the direction of the walk, all triangles that it may be part of are measured. Level 0 is
+//! the samples themselves but for pairs, which are off along the coarser quad's edge only: that is in its error.
+
+use rayon::prelude::*;
+
+use super::shapes::{Shape, Shapes};
+use crate::height::Field;
+use crate::height::surface::{self, Corner};
+
+/// What is known of a square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Square {
+    /// The largest distance, metres, of its triangles from the samples; at least that of the squares in it.
+    pub error: f32,
+    /// Lowest and highest sample, metres; the lowest is above the highest if there are no data.
+    pub range: [f32; 2],
+}
+
+impl Square {
+    const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
+
+    /// Whether any sample has data.
+    #[inline]
+    pub fn has_data(&self) -> bool {
+        self.range[0] <= self.range[1]
+    }
+
+    fn union(self, other: Square) -> Square {
+        let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
+        Square { error: self.error.max(other.error), range }
+    }
+}
+
+/// All squares of a field up to a level.
+pub struct Errors {
+    last: [i32; 2],
+    /// Whether an axis repeats.
+    is_tiled: [bool; 2],
+    /// From level 1.
+    levels: Vec<Level>,
+    /// Of the last level: whether any triangle of the samples' own surface has data.
+    land: Vec<bool>,
+}
+
+/// The squares of a level; those of a tiled axis are held once.
+struct Level {
+    count: [u32; 2],
+    squares: Vec<Square>,
+}
+
+/// Corners in half sides from a square's first corner, by the parity of its place and by its place in its parent.
+type Patterns = [[Vec<[[i32; 2]; 3]>; 4]; 2];
+
+impl Errors {
+    /// Measures a field up to level `most`, in parallel.
+    pub fn new(field: &Field, most: u32) -> Self {
+        let (size, stored) = (field.size(), field.stored());
+        let is_tiled = [0, 1].map(|k| size[k] > stored[k]);
+        let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new(), land: Vec::new() };
+        let patterns = patterns();
+        for level in 1..=most {
+            let level = errors.measured(field, level, &patterns);
+            errors.levels.push(level);
+        }
+        errors.land = errors.measured_land(field, most);
+        errors
+    }
+
+    fn measured_land(&self, field: &Field, level: u32) -> Vec<bool> {
+        let count = self.levels[level as usize - 1].count;
+        let is_land = |k: u32| {
+            let first = [k % count[0], k / count[0]].map(|n| (n as i32) << level);
+            let last = [0, 1].map(|k| (first[k] + (1 << level)).min(self.last[k]));
+            // Squares that may lie anywhere have land if the field has.
+            let anywhere = count == [1, 1] && self.is_tiled != [false; 2];
+            if anywhere { surface::has_land(field, [0; 2], self.last) } else { surface::has_land(field, first, last) }
+        };
+        (0..count[0] * count[1]).into_par_iter().map(is_land).collect()
+    }
+
+    /// Whether any triangle of the samples' own surface has data in a square of the last level.
+    pub fn has_land(&self, at: [i32; 2]) -> bool {
+        self.land[self.index(self.levels.len() as u32, at)]
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| size_of_val(level.squares.as_slice())).sum()
+    }
+
+    /// What is known of a square of a level from 1 on, in the field.
+    #[inline]
+    pub fn square(&self, level: u32, at: [i32; 2]) -> Square {
+        let square = self.held(level, at);
+        if square.has_data() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
+            let parent =
+                if self.levels.len() > level as usize { self.held(level + 1, at.map(|n| n >> 1)) } else { square };
+            return Square { error: parent.range[1] - parent.range[0], ..square };
+        }
+        square
+    }
+
+    #[inline]
+    fn held(&self, level: u32, at: [i32; 2]) -> Square {
+        self.levels[level as usize - 1].squares[self.index(level, at)]
+    }
+
+    #[inline]
+    fn index(&self, level: u32, at: [i32; 2]) -> usize {
+        let count = self.levels[level as usize - 1].count;
+        let [x, z] = [0, 1].map(|k| if self.is_tiled[k] { at[k] as u32 % count[k] } else { at[k] as u32 });
+        (z * count[0] + x) as usize
+    }
+
+    /// Whether the end of a tiled field cuts a square, or the pair of it and the next, which were measured whole.
+    fn is_cut(&self, level: u32, at: [i32; 2]) -> bool {
+        (0..2).any(|k| self.is_tiled[k] && ((at[k] >> 1) + 1) << (level + 1) > self.last[k])
+    }
+
+    /// The range of all heights, metres; the lowest is above the highest if there is no land.
+    pub fn range(&self) -> [f32; 2] {
+        self.levels.last().into_iter().flat_map(|level| &level.squares).fold(Square::NOTHING, |a, b| a.union(*b)).range
+    }
+
+    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
+        // A tiled axis is held once if its squares, and the pairs of them, lie alike in every tile.
+        let stored = field.stored();
+        let repeats = |k: usize| !self.is_tiled[k] || stored[k].is_multiple_of(2 << level);
+        if !repeats(0) || !repeats(1) {
+            return self.anything(field);
+        }
+        let length = |k: usize| if self.is_tiled[k] { stored[k] } else { stored[k] - 1 };
+        let count = [0, 1].map(|k| length(k).div_ceil(1 << level));
+        let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
+            let at = [k % count[0], k / count[0]].map(|n| n as i32);
+            self.measured_square(field, level, at, patterns)
+        });
+        Level { count, squares: squares.collect() }
+    }
+
+    /// Squares that may lie anywhere: their triangles are somewhere between the lowest and the highest sample.
+    fn anything(&self, field: &Field) -> Level {
+        let heights = (0..field.samples().len()).map(|k| field.samples().height(k));
+        let range = heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)]);
+        Level { count: [1, 1], squares: vec![Square { error: range[1] - range[0], range }] }
+    }
+
+    fn measured_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
+        let inner = self.inner(field, level, at);
+        if !inner.has_data() {
+            return inner;
+        }
+        let parity = ((at[0] + at[1]) & 1) as usize;
+        let quarter = ((at[0] & 1) + 2 * (at[1] & 1)) as usize;
+        let error = patterns[parity][quarter].iter().map(|t| self.deviation(field, level, at, t)).fold(0.0, f32::max);
+        Square { error: error.max(inner.error), ..inner }
+    }
+
+    /// What holds for the four squares in a square.
+    fn inner(&self, field: &Field, level: u32, [x, z]: [i32; 2]) -> Square {
+        if level == 1 {
+            let first = [x << 1, z << 1];
+            let last = [0, 1].map(|k| self.within(k, first[k] + 2));
+            return Square { error: 0.0, range: range_of_data(field, first, last) };
+        }
+        let exists = |at: &[i32; 2]| (0..2).all(|k| self.is_tiled[k] || at[k] << (level - 1) < self.last[k]);
+        let children = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| [2 * x + i, 2 * z + j]);
+        let held = &self.levels[level as usize - 2];
+        let child = |at: [i32; 2]| {
+            let [x, z] = [0, 1].map(|k| at[k] as u32 % held.count[k]);
+            held.squares[(z * held.count[0] + x) as usize]
+        };
+        children.into_iter().filter(exists).map(child).fold(Square::NOTHING, Square::union)
+    }
+
+    /// A place along an axis: what sticks out of the field collapses onto its edge.
+    fn within(&self, axis: usize, n: i32) -> i32 {
+        if self.is_tiled[axis] { n } else { n.min(self.last[axis]) }
+    }
+
+    fn deviation(&self, field: &Field, level: u32, at: [i32; 2], triangle: &[[i32; 2]; 3]) -> f32 {
+        let corners = triangle.map(|halves| {
+            let [x, z] = [0, 1].map(|k| self.within(k, (2 * at[k] + halves[k]) << (level - 1)));
+            Corner { x, z, y: field.height(x as u32, z as u32) }
+        });
+        if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(field, &corners) }
+    }
+}
+
+/// The range of all heights between two positions if any sample there has data: it may be alone among holes.
+fn range_of_data(field: &Field, first: [i32; 2], last: [i32; 2]) -> [f32; 2] {
+    let samples = || (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| (i as u32, j as u32)));
+    if field.holes().count() > 0 && samples().all(|(i, j)| field.is_hole(i, j)) {
+        return Square::NOTHING.range;
+    }
+    samples().map(|(i, j)| field.height(i, j)).fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
+}
+
+/// The eight ways to lay (along the strip, forward) onto (x, z): mirrored along either, and exchanged.
+fn lays() -> impl Iterator<Item = (bool, [bool; 2])> {
+    (0..8).map(|k| (k & 1 != 0, [k & 2 != 0, k & 4 != 0]))
+}
+
+/// Lays corners inside a square of `size` half sides onto the lattice; they face up again.
+fn laid(corners: [[i32; 2]; 3], size: i32, (exchanged, mirrored): (bool, [bool; 2])) -> [[i32; 2]; 3] {
+    let mut corners = corners.map(|[u, v]| {
+        let [x, z] = if exchanged { [v, u] } else { [u, v] };
+        [if mirrored[0] { size - x } else { x }, if mirrored[1] { size - z } else { z }]
+    });
+    if exchanged ^ mirrored[0] ^ mirrored[1] {
+        corners.swap(1, 2);
+    }
+    corners
+}
+
+/// Every triangle that a square may be part of.
+fn patterns() -> Patterns {
+    let shapes = Shapes::default();
+    let corners = |shape: &Shape| shape.triangles.iter().map(|&t| shape.corners(t)).collect::<Vec<_>>();
+    let single = |parity: usize| {
+        let shapes = &shapes;
+        lays().flat_map(move |lay| {
+            // A mirror turns the diagonal over, an exchange leaves it.
+            let rising = (parity == 0) == (lay.1[0] ^ lay.1[1]);
+            let triangles: Vec<_> = shapes.singles(rising).iter().flat_map(corners).collect();
+            triangles.into_iter().map(move |t| laid(t, 2, lay)).collect::<Vec<_>>()
+        })
+    };
+    // A pair fills the half of its parent at whose side the coarser quad is.
+    let pair = |quarter: i32| {
+        lays()
+            .flat_map(move |lay| corners(Shapes::default().pair()).into_iter().map(move |t| laid(t, 4, lay)))
+            .map(move |t| t.map(|[x, z]| [x - 2 * (quarter & 1), z - 2 * (quarter >> 1)]))
+    };
+    [0, 1].map(|parity| {
+        [0, 1, 2, 3].map(|quarter| {
+            // Only those that lie in the square in part: pairs on its parent's other sides are not.
+            let touches = |t: &[[i32; 2]; 3]| (0..2).all(|k| t.iter().any(|p| p[k] > 0) && t.iter().any(|p| p[k] < 2));
+            let mut all: Vec<_> = single(parity).chain(pair(quarter).filter(touches)).map(turned).collect();
+            all.sort_unstable();
+            all.dedup();
+            all
+        })
+    })
+}
+
+/// The same triangle from its smallest corner on.
+fn turned([a, b, c]: [[i32; 2]; 3]) -> [[i32; 2]; 3] {
+    [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap_or([a, b, c])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    #[test]
+    fn patterns_are_few_and_face_up() {
+        for triangles in patterns().as_flattened() {
+            assert!((12..30).contains(&triangles.len()), "{}", triangles.len());
+            for [a, b, c] in triangles {
+                assert!((b[1] - a[1]) * (c[0] - a[0]) > (b[0] - a[0]) * (c[1] - a[1]));
+            }
+        }
+    }
+
+    #[test]
+    fn a_tiled_field_is_measured_once_and_for_all_tiles() {
+        let size = [64u32, 32];
+        let heights = (0..size[0] * size[1]).map(|k| ((k * 7919) % 1009) as f32).collect::<Vec<_>>();
+        let field = Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none(0)).tiled([3, 2]);
+        let [w, h] = field.size();
+        let held = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
+        let held = Field::new(Samples::F32(held), [w, h], [1.0; 2], Holes::none(0));
+        let (tiled, whole) = (Errors::new(&field, 4), Errors::new(&held, 4));
+        assert!(tiled.bytes() < whole.bytes() / 3);
+        for level in 1..=4 {
+            for (x, z) in (0..192 >> level).flat_map(|x| (0..64 >> level).map(move |z| (x, z))) {
+                let (of_tiled, exact) = (tiled.square(level, [x, z]), whole.square(level, [x, z]));
+                assert!(of_tiled.error >= exact.error && of_tiled.range[0] <= exact.range[0]);
+                let is_inside = (x / 2 + 1) << (level + 1) < 192 && (z / 2 + 1) << (level + 1) < 64;
+                assert!(!is_inside || of_tiled == exact, "level {level} at ({x}, {z})");
+            }
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Sorted strips: a stream of triangles in the order of sight, made anew for each frame.
+//!
+//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998). The part of the field in the view's footprint
+//! is walked in strips one quad wide; a level function says how large quads are, and five shapes of quads join what
+//! differs. Triangles come out nearest first, at a bounded amount of work for each, while nothing but the last strip is
+//! remembered. The paper's figures are lost: the shapes here follow from its rule that a quad's back edge uses exactly
+//! the vertices of the front edges behind it ([`shapes`], [`walk`]).
+//!
+//! Where this differs from the paper, and why:
+//! - the level of a place is that of the *square* ahead, not of the vertex ahead, so that a bound can be kept over all
+//!   of it; for `level=uniform` that is the published table by squared distance, its condition checked and repaired
+//!   ([`table`]); for `level=certified` errors measured for every shape that a square may take ([`measure`],
+//!   [`certified`]), the set closed over squares that touch ([`splits`]);
+//! - shapes are combined where finer quads are on several sides of one: the published five are not enough there;
+//! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
+//!   one direction. `order=back` turns the list round: both orders are the same triangles;
+//! - a quad's triangles are ordered too, by the eye's side of the lines between them;
+//! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
+//!   paper's variant in three dimensions needs, and a bound would be spent on it;
+//! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
+//!
+//! The surface is made of the samples at quads' corners and middles; plain quads have the crate's alternating
+//! diagonals, but a quad next to finer ones is a fan: the surface is no right-triangle mesh, and which of two levels
+//! gives way where they meet depends on the direction of the walk. The bound covers all of it.
+//!
+//! Laws kept: watertight, covered once, error within tolerance (`level=certified`), no state between views.
+
+pub mod certified;
+pub mod footprint;
+pub mod measure;
+pub mod pages;
+pub mod shapes;
+pub mod splits;
+pub mod table;
+pub mod walk;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
+
+use rayon::prelude::*;
+
+use self::certified::{Certified, bounds};
+use self::footprint::Footprint;
+use self::measure::Errors;
+use self::pages::{Gaze, Grid, Pages, Row};
+use self::shapes::Shapes;
+use self::splits::{Levels, Splits};
+use self::table::Radial;
+use self::walk::{Ground, Stream};
+use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
+use crate::height::Field;
+use crate::view::{Containment, View};
+
+/// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
+/// widened.
+const MOST_TRIANGLES: usize = 1 << 21;
+/// The most pages: beyond it they are made larger.
+const MOST_PAGES: u64 = 1 << 16;
+/// What the tolerance is multiplied by until a frame fits.
+const WIDENING: f64 = 1.5;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "sorted-strips",
+    about: "triangles streamed in the order of sight, strip by strip",
+    paper: "Finch & Bishop 1998",
+    variants: &[Variant { name: "serial", about: "walked on one core, row after row: the same list" }],
+    settings: &[
+        Setting {
+            key: "level",
+            values: Values::Words(&["certified", "uniform"]),
+            default: "certified",
+            about: "what sets a quad's level: its error, or its distance by a table, as published",
+        },
+        Setting {
+            key: "page",
+            values: Values::Words(&["16", "64", "256"]),
+            default: "64",
+            about: "cells along a side of a page: no quad is larger",
+        },
+        Setting {
+            key: "order",
+            values: Values::Words(&["front", "back"]),
+            default: "front",
+            about: "whether the nearest triangle comes first, or the furthest",
+        },
+        Setting {
+            key: "edge",
+            values: Values::Number(0.01, 1e4),
+            default: "20",
+            about: "length of a triangle's side on the screen for level=uniform, in tolerances",
+        },
+        Setting {
+            key: "blend",
+            values: Values::Words(&["off", "height"]),
+            default: "off",
+            about: "whether vertices of level=uniform go over into the next level, or are there at once",
+        },
+    ],
+    build: |field, settings| Box::new(SortedStrips::new(field, settings)),
+};
+
+struct SortedStrips {
+    field: Arc<Field>,
+    errors: Errors,
+    shapes: Shapes,
+    pages: Pages,
+    splits: Splits,
+    /// Length of a triangle's side, tolerances, if levels are uniform.
+    edge: Option<f64>,
+    blends: bool,
+    is_back_to_front: bool,
+    is_serial: bool,
+    limits: Limits,
+    nothing: Geometry,
+}
+
+impl SortedStrips {
+    fn new(field: Arc<Field>, settings: &Settings) -> Self {
+        let grid = Grid::new(&field, (settings.number("page") as u32).ilog2(), MOST_PAGES);
+        let cells = grid.side() as usize;
+        let pages = (grid.count[0] * grid.count[1]) as usize;
+        let limits = Limits {
+            draws: grid.count[0].max(grid.count[1]) as usize,
+            instances: grid.count[0].max(grid.count[1]) as usize,
+            vertices: (pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
+            indices: 3 * (2 * pages * cells * cells).min(MOST_TRIANGLES),
+            upload_bytes: 0,
+        };
+        Self {
+            errors: Errors::new(&field, grid.level),
+            field,
+            shapes: Shapes::default(),
+            pages: Pages::none(grid),
+            splits: Splits::new(grid),
+            edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
+            blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
+            is_back_to_front: settings.word("order") == "back",
+            is_serial: settings.variant() == Some("serial"),
+            limits,
+            nothing: Geometry::default(),
+        }
+    }
+
+    /// Finds the pages in sight.
+    fn look(&mut self, view: &View) {
+        let (field, grid, errors) = (&*self.field, self.pages.grid, &self.errors);
+        let (mut seen, frustum, range) = (Vec::new(), view.frustum(), errors.range());
+        if range[0] <= range[1] {
+            Footprint::new(field, view, range).visit_pages(&grid, |at| {
+                let page = errors.square(grid.level, at);
+                let bounds = bounds(field, grid.level, at, page.range);
+                if errors.has_land(at) && frustum.contains(&bounds) != Containment::Outside {
+                    seen.push(at);
+                }
+            });
+        }
+        self.pages.set(seen);
+    }
+
+    /// Walks the rows of a frame, in parallel or one after the other to the same streams; `None` if they would not fit
+    /// the limits.
+    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
+        let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
+        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: self.blends };
+        let (vertices, indices) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let is_within = |count: &AtomicUsize, more: usize, most: usize| count.fetch_add(more, Relaxed) + more <= most;
+        let walk = |row: &Row| {
+            // Once there is too much, no further row is begun.
+            if vertices.load(Relaxed) > self.limits.vertices || indices.load(Relaxed) > self.limits.indices {
+                return None;
+            }
+            let stream = ground.walk(row);
+            let fits = is_within(&vertices, stream.vertices.len(), self.limits.vertices)
+                && is_within(&indices, stream.indices.len(), self.limits.indices);
+            fits.then_some(stream)
+        };
+        if self.is_serial { rows.iter().map(walk).collect() } else { rows.par_iter().map(walk).collect() }
+    }
+
+    /// The frame's strips under the view's tolerance, or `None` if they would not fit.
+    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
+        if let Some(edge) = self.edge {
+            let levels = Radial::uniform(&self.field, view, edge * view.tolerance.px, self.pages.grid.level);
+            let levels = if self.blends { levels.blending(self.pages.grid.level) } else { levels };
+            return self.walk(&levels, gaze, rows);
+        }
+        self.splits.clear();
+        // A split square has at least six triangles more.
+        let most = self.limits.indices / 18 + 1;
+        let certified = Certified::new(&self.field, &self.errors, &self.pages, view, most);
+        if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows) } else { None }
+    }
+
+    fn fill(&self, streams: Vec<Stream>, list: &mut DrawList) {
+        for (batch, stream) in (0u32..).zip(streams) {
+            let (base, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
+            list.streamed.vertices.extend(stream.vertices);
+            list.streamed.indices.extend(stream.indices.iter().map(|k| base + k));
+            list.instances.push(Instance { batch, ..Instance::default() });
+            let indices = first..list.streamed.indices.len() as u32;
+            let (source, topology) = (Source::Streamed, Topology::Triangles);
+            list.draws.push(Draw { source, topology, indices, instances: batch..batch + 1, first_vertex: 0 });
+        }
+        if self.is_back_to_front {
+            turn_round(list);
+        }
+    }
+}
+
+/// Turns the order of all triangles round.
+fn turn_round(list: &mut DrawList) {
+    let count = list.streamed.indices.len() as u32;
+    list.streamed.indices.reverse();
+    // Each triangle's own three too: they turn as before.
+    list.streamed.indices.chunks_exact_mut(3).for_each(|t| t.reverse());
+    list.draws.reverse();
+    list.draws.iter_mut().for_each(|draw| draw.indices = count - draw.indices.end..count - draw.indices.start);
+}
+
+impl Technique for SortedStrips {
+    fn resident(&self) -> &Geometry {
+        &self.nothing
+    }
+
+    fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.look(view);
+        let gaze = Gaze::new(&self.field, view);
+        let rows = self.pages.rows(&gaze);
+        let mut wider = *view;
+        let streams = loop {
+            if let Some(streams) = self.strips(&wider, &gaze, &rows) {
+                break streams;
+            }
+            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+        };
+        self.fill(streams, list);
+        list.widening =
+            if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px };
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        self.edge.is_none()
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        let pages = self.pages.grid.count.map(f64::from);
+        vec![
+            ("pages", pages[0] * pages[1], ""),
+            ("cells along a side of a page", f64::from(self.pages.grid.side()), ""),
+            ("bytes of errors", self.errors.bytes() as f64, "B"),
+        ]
+    }
+}

@@ -1,0 +1,238 @@
+//! Pages: squares of the lattice that are drawn or not as a whole, and the order in which they are walked.
+//!
+//! Rows of pages along the minor direction are walked outward from the eye's own row, and in each row pages outward
+//! from the eye's own column. So every ray that leaves the eye meets pages in the order in which they are drawn, and
+//! every page is walked away from the eye. Only in the eye's own row and column, which have land on both sides of
+//! the eye, is the direction that of the view.
+
+use std::ops::Range;
+
+use crate::height::Field;
+use crate::view::{Lens, View};
+
+/// The pages over a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Level of a quad that fills a page: a page has 2^level cells a side.
+    pub level: u32,
+    /// Pages along (x, z); the last ones may stick out of the field.
+    pub count: [u32; 2],
+    /// The last sample of the field.
+    pub last: [i32; 2],
+}
+
+impl Grid {
+    /// Pages of at least 2^level cells a side, larger ones where there would be more than `most`.
+    pub fn new(field: &Field, level: u32, most: u64) -> Self {
+        let last = field.size().map(|n| n as i32 - 1);
+        let count = |level: u32| last.map(|n| (n as u32).div_ceil(1 << level));
+        let fits = |level: &u32| count(*level).iter().map(|&n| u64::from(n)).product::<u64>() <= most;
+        let level = (level..31).find(fits).unwrap_or(30);
+        Self { level, count: count(level), last }
+    }
+
+    /// Samples along a side of a page.
+    pub fn side(&self) -> i32 {
+        1 << self.level
+    }
+
+    /// A page's place among all; `None` outside.
+    #[inline]
+    pub fn index(&self, [x, z]: [i32; 2]) -> Option<usize> {
+        let inside = x >= 0 && z >= 0 && (x as u32) < self.count[0] && (z as u32) < self.count[1];
+        inside.then(|| z as usize * self.count[0] as usize + x as usize)
+    }
+}
+
+/// The pages to be drawn.
+#[derive(Clone, Debug)]
+pub struct Pages {
+    /// All of them.
+    pub grid: Grid,
+    drawn: Vec<bool>,
+    list: Vec<[i32; 2]>,
+}
+
+impl Pages {
+    /// None of them.
+    pub fn none(grid: Grid) -> Self {
+        Self { grid, drawn: vec![false; (grid.count[0] * grid.count[1]) as usize], list: Vec::new() }
+    }
+
+    /// Takes the pages in place of those before.
+    pub fn set(&mut self, pages: impl IntoIterator<Item = [i32; 2]>) {
+        for at in self.list.drain(..) {
+            self.grid.index(at).into_iter().for_each(|k| self.drawn[k] = false);
+        }
+        for at in pages {
+            if let Some(k) = self.grid.index(at).filter(|&k| !self.drawn[k]) {
+                self.drawn[k] = true;
+                self.list.push(at);
+            }
+        }
+    }
+
+    /// Those to be drawn.
+    pub fn list(&self) -> &[[i32; 2]] {
+        &self.list
+    }
+
+    /// Whether a page is to be drawn.
+    #[inline]
+    pub fn is_drawn(&self, at: [i32; 2]) -> bool {
+        self.grid.index(at).is_some_and(|k| self.drawn[k])
+    }
+
+    /// The rows of pages to walk, nearest first.
+    pub fn rows(&self, gaze: &Gaze) -> Vec<Row> {
+        let (major, side) = (gaze.major, f64::from(self.grid.side()));
+        let wanted: Vec<bool> = (0..self.grid.count[major] as i32)
+            .map(|row| (0..self.grid.count[1 - major] as i32).any(|n| self.is_drawn(placed(major, row, n))))
+            .collect();
+        let eye_row = (gaze.eye[major] / side).floor();
+        let outward = outward(eye_row, gaze.ahead[major], wanted.len() as i32);
+        let rows = outward.filter(|&(row, _)| wanted[row as usize]);
+        rows.map(|(row, sign)| Row {
+            row,
+            sign,
+            runs: self.runs(gaze, row),
+            // The row behind the first one of each direction is drawn later, or is the first one.
+            has_behind: f64::from(row) != eye_row.clamp(0.0, (wanted.len() - 1) as f64),
+        })
+        .collect()
+    }
+
+    fn runs(&self, gaze: &Gaze, row: i32) -> Vec<Run> {
+        let (major, minor) = (gaze.major, 1 - gaze.major);
+        let count = self.grid.count[minor] as i32;
+        let eye_column = (gaze.eye[minor] / f64::from(self.grid.side())).floor();
+        let mut runs: Vec<Run> = Vec::new();
+        for (column, sign) in outward(eye_column, gaze.ahead[minor], count) {
+            if !self.is_drawn(placed(major, row, column)) {
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run) if run.sign == sign && run.first + sign * run.pages == column => run.pages += 1,
+                _ => runs.push(Run { first: column, pages: 1, sign }),
+            }
+        }
+        runs
+    }
+}
+
+/// A place by its coordinate along the major direction and along the other one.
+#[inline]
+pub fn placed(major: usize, along: i32, across: i32) -> [i32; 2] {
+    if major == 0 { [along, across] } else { [across, along] }
+}
+
+/// 0 to `count`, outward from where the eye is (or next to it): first in the direction of the view, then in the
+/// other; each with the direction away from the eye.
+fn outward(eye: f64, ahead: i32, count: i32) -> impl Iterator<Item = (i32, i32)> {
+    let own = eye.clamp(0.0, f64::from(count - 1)) as i32;
+    // Beside the field there is one direction only.
+    let ahead = if eye < 0.0 {
+        1
+    } else if eye > f64::from(count - 1) {
+        -1
+    } else {
+        ahead
+    };
+    let to = |first: i32, sign: i32| {
+        let ends: Range<i32> = if sign > 0 { 0..count - first } else { 0..first + 1 };
+        ends.map(move |n| (first + sign * n, sign))
+    };
+    to(own, ahead).chain(to(own - ahead, -ahead))
+}
+
+/// A row of pages and how it is walked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Its place along the major direction.
+    pub row: i32,
+    /// Whether it is walked towards greater positions (1) or smaller ones (−1).
+    pub sign: i32,
+    /// Pages side by side, each run from its first page on.
+    pub runs: Vec<Run>,
+    /// Whether the row behind it is drawn before it.
+    pub has_behind: bool,
+}
+
+/// Pages side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run {
+    /// The first one's place along the minor direction.
+    pub first: i32,
+    /// How many.
+    pub pages: i32,
+    /// Whether they are walked towards greater positions (1) or smaller ones (−1).
+    pub sign: i32,
+}
+
+/// Where the eye is over the lattice and where it looks: what the order depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Gaze {
+    /// The direction nearest the view's, along which strips follow each other: 0 along x, 1 along z.
+    pub major: usize,
+    /// Where rays come from, samples. Parallel ones come from far away.
+    pub eye: [f64; 2],
+    /// Signs of the view's direction, ±1.
+    pub ahead: [i32; 2],
+}
+
+/// Where parallel rays are said to come from, in the field's sizes.
+const FAR: f64 = 1e9;
+
+impl Gaze {
+    /// That of a view of a field.
+    pub fn new(field: &Field, view: &View) -> Self {
+        let forward = [view.forward().x, view.forward().z];
+        let extent_m = [0, 1].map(|k| field.spacing[k] * f64::from(field.size()[k])).into_iter().fold(0.0, f64::max);
+        let far_m = match view.lens {
+            Lens::Perspective { .. } => 0.0,
+            Lens::Orthographic { .. } => FAR * extent_m,
+        };
+        let eye = [0, 1].map(|k| {
+            let from = [view.eye.x, view.eye.z][k] - far_m * forward[k];
+            (from - field.origin[k]) / field.spacing[k]
+        });
+        Self {
+            major: usize::from(forward[0].abs() <= forward[1].abs()),
+            eye,
+            ahead: forward.map(|f| if f < 0.0 { -1 } else { 1 }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_place_comes_once_and_outward() {
+        for (eye, ahead, count) in [(3.0, 1, 8), (3.0, -1, 8), (-7.0, -1, 4), (99.0, 1, 5), (0.0, -1, 1)] {
+            let places: Vec<_> = outward(eye, ahead, count).collect();
+            let mut sorted: Vec<_> = places.iter().map(|p| p.0).collect();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..count).collect::<Vec<_>>());
+            for sign in [-1, 1] {
+                let own: Vec<_> = places.iter().filter(|p| p.1 == sign).map(|p| p.0 * sign).collect();
+                assert!(own.is_sorted(), "{places:?}");
+                assert!(own.iter().all(|n| f64::from(*n) >= f64::from(sign) * eye), "{places:?} away from {eye}");
+            }
+        }
+    }
+
+    #[test]
+    fn runs_end_where_pages_are_missing() {
+        let grid = Grid { level: 4, count: [9, 2], last: [140, 31] };
+        let mut pages = Pages::none(grid);
+        pages.set([0, 1, 3, 4, 5, 6, 8].map(|x| [x, 1]));
+        let gaze = Gaze { major: 1, eye: [70.0, -100.0], ahead: [1, 1] };
+        let rows = pages.rows(&gaze);
+        let run = |first, pages, sign| Run { first, pages, sign };
+        assert_eq!(rows.len(), 1);
+        assert_eq!((rows[0].row, rows[0].sign, rows[0].has_behind), (1, 1, true));
+        assert_eq!(rows[0].runs, [run(4, 3, 1), run(8, 1, 1), run(3, 1, -1), run(1, 2, -1)]);
+    }
+}

@@ -1,0 +1,253 @@
+//! The quads that a strip is made of: which triangles each has, and in which order they are seen.
+//!
+//! Walking to the right, the front at the bottom. A quad's front edge is whole, whatever comes in front of it; its
+//! back edge has the vertices of the front edges behind it; its sides have those of finer quads beside it.
+//!
+//! ```text
+//!  a───────b   a───e───b   a───────────────b   a───────b   a───────b      a ──▸ minor direction
+//!  │     ╱ │   │  ╱  ╱ │   │ ╲           ╱ │   │     ╱ │   │   ╱ ╱ │      │
+//!  │   ╱   │   │ ╱ ╱   │   │    ╲     ╱    │   │   ╱ ╱ g   f ╱ ╱   │      ▾
+//!  │ ╱     │   │╱╱     │   │       ╲╱      │   │ ╱ ╱   │   │ ╱     │      major direction
+//!  d───────c   d───────c   d───────m───────c   d───────c   d───────c
+//!   A  plain    B  finer    C  coarser behind:  D  finer    E  finer
+//!                 behind       two advances        ahead      behind us: merging
+//! ```
+//!
+//! Every shape keeps A's diagonal, which is that of [`rtin`](crate::height::rtin) at the quad's level, and bisects a
+//! triangle from a middle on its side to the corner across: where the middle lies on the straight side, nothing
+//! changes. C's lines meet where those of its two quads do. Where a quad has finer ones on two or three of its sides,
+//! B, D and E are combined: that happens wherever a border between two levels turns a corner.
+
+/// Vertices of a quad: corners, middles of three sides, and the middle of the front edge of C.
+pub mod slot {
+    /// Trailing corner behind.
+    pub const A: usize = 0;
+    /// Leading corner behind.
+    pub const B: usize = 1;
+    /// Leading corner in front.
+    pub const C: usize = 2;
+    /// Trailing corner in front.
+    pub const D: usize = 3;
+    /// Middle of the back edge.
+    pub const E: usize = 4;
+    /// Middle of the trailing side.
+    pub const F: usize = 5;
+    /// Middle of the leading side.
+    pub const G: usize = 6;
+    /// Middle of the front edge.
+    pub const M: usize = 7;
+}
+use slot::{A, B, C, D, E, F, G, M};
+
+/// The back edge has a middle.
+pub const BACK: usize = 1;
+/// The trailing side has a middle.
+pub const TRAILING: usize = 2;
+/// The leading side has a middle.
+pub const LEADING: usize = 4;
+
+/// Number of combinations of middles.
+const MASKS: usize = 8;
+
+/// Where slots lie, (along the strip, forward).
+pub type Places = [[f64; 2]; 8];
+
+/// Where the vertices of a quad lie, in half sides.
+const PLACES: Places = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [1.0, 0.0], [0.0, 1.0], [2.0, 1.0], [1.0, 2.0]];
+/// Where those of C lie, in half sides of its two finer halves.
+const PAIR_PLACES: Places =
+    [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [2.0, 2.0]];
+
+/// One kind of quad.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Triangles as vertices' slots; they face up where x is along the strip and z forward.
+    pub triangles: Vec<[usize; 3]>,
+    /// Where slots lie, half sides.
+    pub places: &'static Places,
+    /// Triangles side by side, and the line between them, with the first triangle on the side where
+    /// [`side`] is positive.
+    seams: Vec<Seam>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Seam {
+    first: usize,
+    second: usize,
+    line: [usize; 2],
+}
+
+/// All kinds of quads.
+pub struct Shapes {
+    /// By middles, with one diagonal and with the other.
+    single: Vec<Shape>,
+    pair: Shape,
+}
+
+impl Default for Shapes {
+    fn default() -> Self {
+        let shape = |k: usize| Shape::new(triangles(k % MASKS, k >= MASKS), &PLACES);
+        let pair = Shape::new(vec![[A, M, D], [A, B, M], [M, B, C]], &PAIR_PLACES);
+        Self { single: (0..2 * MASKS).map(shape).collect(), pair }
+    }
+}
+
+impl Shapes {
+    /// The quad with these middles; `rising`: its diagonal goes from B to D rather than from A to C.
+    #[inline]
+    pub fn single(&self, middles: usize, rising: bool) -> &Shape {
+        &self.single[middles + if rising { MASKS } else { 0 }]
+    }
+
+    /// Two quads side by side that match one coarser front edge.
+    #[inline]
+    pub fn pair(&self) -> &Shape {
+        &self.pair
+    }
+
+    /// Quads of one kind of diagonal.
+    pub fn singles(&self, rising: bool) -> &[Shape] {
+        let first = if rising { MASKS } else { 0 };
+        &self.single[first..first + MASKS]
+    }
+}
+
+/// The two triangles of a plain quad, each bisected from a middle on its side to the corner across from it.
+fn triangles(middles: usize, rising: bool) -> Vec<[usize; 3]> {
+    let middle = |bit: usize, slot: usize| (middles & bit != 0).then_some(slot);
+    let [e, f, g] = [middle(BACK, E), middle(TRAILING, F), middle(LEADING, G)];
+    match rising {
+        false => [bisected([A, B, C], e, g), bisected([C, D, A], None, f)].concat(),
+        true => [bisected([D, A, B], f, e), bisected([B, C, D], g, None)].concat(),
+    }
+}
+
+/// A triangle with middles on its first and its second side, or without.
+fn bisected([p, q, r]: [usize; 3], first: Option<usize>, second: Option<usize>) -> Vec<[usize; 3]> {
+    match (first, second) {
+        (None, None) => vec![[p, q, r]],
+        (Some(m), None) => vec![[p, m, r], [m, q, r]],
+        (None, Some(n)) => vec![[p, q, n], [p, n, r]],
+        (Some(m), Some(n)) => vec![[m, q, n], [p, m, n], [p, n, r]],
+    }
+}
+
+impl Shape {
+    fn new(triangles: Vec<[usize; 3]>, places: &'static Places) -> Self {
+        let at = |slot: usize| places[slot];
+        let upward = |t: [usize; 3]| if side([at(t[0]), at(t[1])], at(t[2])) > 0.0 { [t[0], t[2], t[1]] } else { t };
+        let triangles: Vec<_> = triangles.into_iter().map(upward).collect();
+        let mut seams = Vec::new();
+        for second in 0..triangles.len() {
+            for first in 0..second {
+                let shared: Vec<_> = triangles[first].into_iter().filter(|k| triangles[second].contains(k)).collect();
+                if let [from, to] = shared[..] {
+                    let apex = triangles[first].into_iter().find(|k| !shared.contains(k)).map_or([0.0; 2], at);
+                    let is_positive = side([at(from), at(to)], apex) > 0.0;
+                    seams.push(Seam { first, second, line: if is_positive { [from, to] } else { [to, from] } });
+                }
+            }
+        }
+        Self { triangles, places, seams }
+    }
+
+    /// A triangle's corners, half sides.
+    pub fn corners(&self, triangle: [usize; 3]) -> [[i32; 2]; 3] {
+        triangle.map(|slot| self.places[slot].map(|n| n as i32))
+    }
+
+    /// Calls `visit` for each triangle, nearest first along every ray from `eye`, where slots lie at `places`: of two
+    /// triangles side by side the one on the eye's side of the line between them comes first.
+    #[inline]
+    pub fn visit_in_order(&self, places: &Places, eye: [f64; 2], mut visit: impl FnMut([usize; 3])) {
+        let mut behind = [0u8; 5];
+        for seam in &self.seams {
+            let first_is_nearer = side(seam.line.map(|slot| places[slot]), eye) >= 0.0;
+            let (near, far) = if first_is_nearer { (seam.first, seam.second) } else { (seam.second, seam.first) };
+            behind[far] |= 1 << near;
+        }
+        // The triangles and their seams form a tree: in each round one is free.
+        let mut waiting = (1u8 << self.triangles.len()) - 1;
+        while waiting != 0 {
+            for (k, triangle) in self.triangles.iter().enumerate() {
+                if waiting >> k & 1 == 1 && behind[k] & waiting == 0 {
+                    visit(*triangle);
+                    waiting &= !(1 << k);
+                }
+            }
+        }
+    }
+}
+
+/// Positive on one side of a line, negative on the other.
+#[inline]
+fn side([from, to]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
+    (to[0] - from[0]) * (point[1] - from[1]) - (to[1] - from[1]) * (point[0] - from[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn doubled_area(corners: [[i32; 2]; 3]) -> i32 {
+        let [a, b, c] = corners;
+        (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
+    }
+
+    fn all() -> Vec<Shape> {
+        let shapes = Shapes::default();
+        [shapes.singles(false), shapes.singles(true), std::slice::from_ref(shapes.pair())].concat()
+    }
+
+    #[test]
+    fn each_shape_faces_up_and_fills_its_quad() {
+        for (k, shape) in all().iter().enumerate() {
+            let areas: Vec<_> = shape.triangles.iter().map(|&t| doubled_area(shape.corners(t))).collect();
+            assert!(areas.iter().all(|area| *area > 0), "{k}: {areas:?}");
+            assert_eq!(areas.iter().sum::<i32>(), if k < 2 * MASKS { 8 } else { 16 }, "{k}");
+            assert_eq!(shape.seams.len(), shape.triangles.len() - 1, "{k}: triangles in a tree");
+        }
+    }
+
+    #[test]
+    fn each_shape_has_the_middles_it_is_named_by_and_no_others() {
+        let shapes = Shapes::default();
+        for (middles, rising) in (0..MASKS).flat_map(|k| [(k, false), (k, true)]) {
+            // Nothing changes where middles lie on straight sides.
+            let plain: Vec<_> = shapes.single(0, rising).triangles.clone();
+            let holds = |plain: &[usize; 3], triangle: &[usize; 3]| {
+                let corners = plain.map(|slot| PLACES[slot]);
+                triangle.iter().all(|&p| (0..3).all(|k| side([corners[k], corners[(k + 1) % 3]], PLACES[p]) <= 0.0))
+            };
+            let inner = &shapes.single(middles, rising).triangles;
+            assert!(inner.iter().all(|t| plain.iter().any(|p| holds(p, t))), "{middles} {rising}");
+            let triangles = &shapes.single(middles, rising).triangles;
+            for (slot, bit) in [(E, BACK), (F, TRAILING), (G, LEADING), (M, 0)] {
+                assert_eq!(triangles.as_flattened().contains(&slot), middles & bit != 0, "{middles} slot {slot}");
+            }
+        }
+    }
+
+    /// Along rays from an eye anywhere, triangles are met in the order of the visits.
+    #[test]
+    fn triangles_come_nearest_first() {
+        for shape in all() {
+            for k in 0..4000 {
+                let random = |n: u32| f64::from((k * 4 + n).wrapping_mul(0x9e37_79b1) >> 8) / f64::from(1 << 24);
+                let eye = [random(0) * 12.0 - 5.0, random(1) * 12.0 - 5.0];
+                let towards = [random(2) * 4.0 - eye[0], random(3) * 2.0 - eye[1]];
+                let mut met = Vec::new();
+                shape.visit_in_order(shape.places, eye, |triangle| {
+                    let corners = shape.corners(triangle).map(|p| p.map(f64::from));
+                    let steps = (0..600).map(|n| f64::from(n) / 200.0);
+                    let inside = |t: &f64| {
+                        let p = [eye[0] + t * towards[0], eye[1] + t * towards[1]];
+                        (0..3).all(|n| side([corners[n], corners[(n + 1) % 3]], p) < -1e-9)
+                    };
+                    met.extend(steps.clone().find(inside));
+                });
+                assert!(met.is_sorted(), "{:?} from {eye:?}: {met:?}", shape.triangles);
+            }
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Which squares may not be drawn as one quad: the restricted quadtree that strips are walked over, as bits.
+//!
+//! A square of level l has a side of 2^l samples. A set of split squares is *closed* if squares that touch, at a
+//! corner too, are drawn within one level of each other. That is the Lipschitz condition of Finch & Bishop's level
+//! function (§4.5), and [`Splits::close`] repairs a set that breaks it by splitting more.
+
+use super::pages::{Grid, Pages};
+
+/// What strips ask of a level function.
+pub trait Levels: Sync {
+    /// Whether a square of a level is to be drawn by quads of finer levels. True of every square that a split one
+    /// lies in or, one level below, touches; level 0 is never split.
+    fn is_split(&self, level: u32, at: [i32; 2]) -> bool;
+
+    /// How far the vertex at a position has gone to its place in the next level, 0 to 1, if `level` is the coarsest that
+    /// has it. It must be 1 where a square of the next level around it, or with it on its side, is not split.
+    fn weight(&self, _level: u32, _at: [i32; 2]) -> f32 {
+        0.0
+    }
+}
+
+/// A set of split squares.
+pub struct Splits {
+    grid: Grid,
+    /// By page: where its bits begin in `words`, and one; 0 if none of them is set.
+    places: Vec<u32>,
+    words: Vec<u64>,
+    words_per_page: usize,
+    /// By level: the first bit in a page.
+    first_bits: Vec<usize>,
+    /// By level.
+    lists: Vec<Vec<[i32; 2]>>,
+}
+
+impl Splits {
+    /// No square is split.
+    pub fn new(grid: Grid) -> Self {
+        let bits = |level: u32| 1usize << (2 * (grid.level - level));
+        // From the page down, level 0 excepted.
+        let mut first_bits = vec![0; grid.level as usize + 1];
+        (1..grid.level as usize).rev().for_each(|l| first_bits[l] = first_bits[l + 1] + bits(l as u32 + 1));
+        let words_per_page = (first_bits.get(1).copied().unwrap_or(0) + bits(1)).div_ceil(64);
+        let pages = (grid.count[0] * grid.count[1]) as usize;
+        let lists = vec![Vec::new(); grid.level as usize + 1];
+        Self { grid, places: vec![0; pages], words: Vec::new(), words_per_page, first_bits, lists }
+    }
+
+    /// Empties the set and keeps its memory.
+    pub fn clear(&mut self) {
+        let Self { grid, places, lists, .. } = self;
+        for (level, list) in lists.iter_mut().enumerate() {
+            for at in list.drain(..) {
+                let page = at.map(|n| n >> (grid.level - level as u32));
+                grid.index(page).into_iter().for_each(|k| places[k] = 0);
+            }
+        }
+        self.words.clear();
+    }
+
+    /// How many squares are split.
+    pub fn count(&self) -> usize {
+        self.lists.iter().map(Vec::len).sum()
+    }
+
+    /// Word and bit of a square in its page.
+    #[inline]
+    fn bit(&self, level: u32, at: [i32; 2]) -> (usize, u64) {
+        let above = self.grid.level - level;
+        let [x, z] = at.map(|n| (n & ((1 << above) - 1)) as usize);
+        let bit = self.first_bits[level as usize] + (z << above) + x;
+        (bit / 64, 1 << (bit % 64))
+    }
+
+    /// Splits a square in a page to be drawn; `false` if it was split before, or is in no such page.
+    pub fn insert(&mut self, pages: &Pages, level: u32, at: [i32; 2]) -> bool {
+        let page = at.map(|n| n >> (self.grid.level - level));
+        let Some(k) = self.grid.index(page).filter(|_| pages.is_drawn(page)) else { return false };
+        if self.places[k] == 0 {
+            self.places[k] = (self.words.len() / self.words_per_page) as u32 + 1;
+            self.words.resize(self.words.len() + self.words_per_page, 0);
+        }
+        let (word, bit) = self.bit(level, at);
+        let word = &mut self.words[(self.places[k] as usize - 1) * self.words_per_page + word];
+        if *word & bit != 0 {
+            return false;
+        }
+        *word |= bit;
+        self.lists[level as usize].push(at);
+        true
+    }
+
+    /// Splits what is needed for the set to be closed: from the finest level up, the square that each split one lies
+    /// in, and the three others of that level that it touches. It reaches less than a page beyond a split square.
+    pub fn close(&mut self, pages: &Pages) {
+        for level in 1..self.grid.level {
+            let mut k = 0;
+            while let Some(&[x, z]) = self.lists[level as usize].get(k) {
+                for (x, z) in [(x - 1, z - 1), (x + 1, z - 1), (x - 1, z + 1), (x + 1, z + 1)] {
+                    self.insert(pages, level + 1, [x >> 1, z >> 1]);
+                }
+                k += 1;
+            }
+        }
+    }
+}
+
+impl Levels for Splits {
+    #[inline]
+    fn is_split(&self, level: u32, at: [i32; 2]) -> bool {
+        let Some(k) = self.grid.index(at.map(|n| n >> (self.grid.level - level))) else { return false };
+        if level == 0 || self.places[k] == 0 {
+            return false;
+        }
+        let (word, bit) = self.bit(level, at);
+        self.words[(self.places[k] as usize - 1) * self.words_per_page + word] & bit != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { level: 4, count: [3, 3], last: [47, 47] };
+
+    fn everywhere() -> Pages {
+        let mut pages = Pages::none(GRID);
+        pages.set((0..9).map(|k| [k % 3, k / 3]));
+        pages
+    }
+
+    /// Level of the quad over a cell.
+    fn level(splits: &Splits, [x, z]: [i32; 2]) -> u32 {
+        (0..GRID.level)
+            .rev()
+            .find(|&l| splits.is_split(l + 1, [x >> (l + 1), z >> (l + 1)]))
+            .map_or(GRID.level, |l| (0..=l).rev().find(|&l| !splits.is_split(l, [x >> l, z >> l])).unwrap_or(0))
+    }
+
+    #[test]
+    fn closed_sets_have_quads_that_touch_within_one_level() {
+        let pages = everywhere();
+        let mut seed = 5u32;
+        let mut random = |n: u32| {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            (seed >> 8) % n
+        };
+        let mut splits = Splits::new(GRID);
+        for round in 0..300 {
+            splits.clear();
+            for _ in 0..round % 7 {
+                let l = 1 + random(3);
+                splits.insert(&pages, l, [random(48 >> l) as i32, random(48 >> l) as i32]);
+            }
+            splits.close(&pages);
+            for (x, z) in (0..47).flat_map(|x| (0..47).map(move |z| (x, z))) {
+                for (dx, dz) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
+                    let [one, other] = [[x, z], [x + dx, (z + dz).max(0)]].map(|at| level(&splits, at));
+                    assert!(one.abs_diff(other) <= 1, "levels {one} and {other} touch at ({x}, {z})");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn clearing_leaves_nothing() {
+        let pages = everywhere();
+        let mut splits = Splits::new(GRID);
+        assert!(splits.insert(&pages, 1, [9, 9]) && !splits.insert(&pages, 1, [9, 9]));
+        splits.close(&pages);
+        assert!(splits.is_split(4, [1, 1]) && splits.count() >= 4);
+        splits.clear();
+        assert_eq!(splits.count(), 0);
+        assert!((1..=4).all(|l| !splits.is_split(l, [18 >> l, 18 >> l])));
+    }
+}

@@ -1,0 +1,227 @@
+//! The published level function: a table indexed by the squared distance from the eye (Finch & Bishop, §4.5),
+//!
+//! LOD = LUT[distance² · scale]
+//!
+//! with distance in plan from the eye to the nearest point of a square, and the eye's height above the land under it as
+//! the third side. Any table may be given. Whether it keeps the Lipschitz condition is checked, never assumed.
+
+use super::splits::Levels;
+use crate::height::Field;
+use crate::view::{Lens, View};
+
+/// Entries of a table.
+const ENTRIES: usize = 1 << 14;
+
+/// Levels by squared distance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    levels: Vec<u8>,
+    /// Entries per square metre.
+    scale: f64,
+}
+
+impl Table {
+    /// Any levels; the last one holds for all greater distances. `scale`: entries per square metre.
+    ///
+    /// # Panics
+    /// If there is no level.
+    pub fn new(levels: Vec<u8>, scale: f64) -> Self {
+        assert!(!levels.is_empty());
+        Self { levels, scale }
+    }
+
+    /// Levels that double with the distance, so that triangles are as large on the screen: `unit_m` metres away is
+    /// level 1, up to `most`. The table reaches further by `more_m`, for repairs. Its entries are those of any larger
+    /// unit or divide them, so that a smaller unit never gives a finer level.
+    pub fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
+        let reach_m = unit_m * f64::from(1u32 << most.saturating_sub(1)) + more_m;
+        let scale = 0.25f64.powf((reach_m / ((ENTRIES - 1) as f64).sqrt()).log2().ceil());
+        let level = |k: usize| {
+            let distance = (k as f64 / scale).sqrt() / unit_m;
+            (0..most).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
+        };
+        Self { levels: (0..ENTRIES).map(level).collect(), scale }
+    }
+
+    /// The level at a squared distance, metres².
+    #[inline]
+    pub fn level(&self, squared_m2: f64) -> u32 {
+        u32::from(self.levels[((squared_m2 * self.scale) as usize).min(self.levels.len() - 1)])
+    }
+
+    /// The entry from which on every level is at least this one.
+    fn begin(&self, level: u32) -> usize {
+        self.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1)
+    }
+
+    /// Distance at which an entry begins, metres; infinite beyond the last.
+    fn distance_m(&self, entry: usize) -> f64 {
+        match entry {
+            0 => 0.0,
+            _ if entry < self.levels.len() => (entry as f64 / self.scale).sqrt(),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Where a level must not begin before, metres, if the one before it begins at an entry: one diagonal of a square
+    /// of that one further, so that squares touching the last ones split at it are split too.
+    fn least_m(&self, before: usize, level: u32, diagonal_m: f64) -> f64 {
+        // Nothing is split where the level before holds everywhere.
+        let is_needed = level > 1 && before > 0;
+        if is_needed { self.distance_m(before) + diagonal_m * f64::from(1u32 << (level - 1)) } else { 0.0 }
+    }
+
+    /// Whether an entry begins at a distance or beyond it, but for rounding.
+    fn begins_at(&self, entry: usize, least_m: f64) -> bool {
+        self.distance_m(entry) >= least_m * (1.0 - 1e-12)
+    }
+
+    /// The first level, from 1 to `most`, at which the table breaks its condition for cells of this diagonal
+    /// (metres); `None` if it keeps it. Levels must rise with the distance, and none may begin before squares that
+    /// touch those with the level before the last one have ended.
+    pub fn broken_at(&self, diagonal_m: f64, most: u32) -> Option<u32> {
+        let falls = self.levels.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| u32::from(pair[0]));
+        let is_early = |level: &u32| {
+            let least_m = self.least_m(self.begin(level - 1), *level, diagonal_m);
+            !self.begins_at(self.begin(*level), least_m)
+        };
+        falls.or_else(|| (2..=most).find(is_early))
+    }
+
+    /// Lowers levels where they break the condition, and nowhere else.
+    pub fn repair(&mut self, diagonal_m: f64, most: u32) {
+        let mut begins = vec![0];
+        for level in 1..=most {
+            let (own, least_m) = (self.begin(level), self.least_m(begins[level as usize - 1], level, diagonal_m));
+            let least = (least_m * least_m * self.scale).ceil().min(self.levels.len() as f64) as usize;
+            begins.push(if self.begins_at(own, least_m) { own } else { own.max(least) });
+        }
+        for (k, level) in self.levels.iter_mut().enumerate() {
+            *level = begins.iter().rposition(|&begin| begin <= k).unwrap_or(0) as u8;
+        }
+    }
+}
+
+/// A table over a field, seen from somewhere.
+#[derive(Clone, Debug)]
+pub struct Radial {
+    table: Table,
+    spacing: [f64; 2],
+    /// The eye over the lattice, samples.
+    eye: [f64; 2],
+    /// Squared height of the eye above the land under it, metres².
+    above_m2: f64,
+    /// By level: the distance from which on it is allowed, metres; empty if vertices do not blend.
+    begins_m: Vec<f64>,
+}
+
+impl Radial {
+    /// Triangles whose short sides are about `edge_px` pixels long on the screen, up to level `most`; the table is
+    /// repaired if it must be.
+    pub fn uniform(field: &Field, view: &View, edge_px: f64, most: u32) -> Self {
+        let [dx, dz] = field.spacing;
+        let sample_px = view.focal_px() * dx.max(dz);
+        let mut table = match view.lens {
+            Lens::Perspective { .. } => {
+                Table::doubling(2.0 * sample_px / edge_px, most, dx.hypot(dz) * f64::from(2u32 << most))
+            }
+            // The same level everywhere.
+            Lens::Orthographic { .. } => Table::new(
+                vec![(0..most).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8],
+                0.0,
+            ),
+        };
+        table.repair(dx.hypot(dz), most);
+        Self::new(field, view, table)
+    }
+
+    /// A table, seen from the view's eye.
+    pub fn new(field: &Field, view: &View, table: Table) -> Self {
+        let eye = [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k]);
+        let above_m = (view.eye.y - ground(field, eye)).max(0.0);
+        Self { table, spacing: field.spacing, eye, above_m2: above_m * above_m, begins_m: Vec::new() }
+    }
+
+    /// Vertices of levels below `most` go over into the next level (Finch & Bishop, §4.9).
+    pub fn blending(mut self, most: u32) -> Self {
+        self.begins_m = (0..=most).map(|level| self.table.distance_m(self.table.begin(level))).collect();
+        self
+    }
+}
+
+/// Height of the land at a position, or at the nearest one of the field, metres: continuous, so that blending is.
+fn ground(field: &Field, at: [f64; 2]) -> f64 {
+    let size = field.size();
+    let cell = [0, 1].map(|k| at[k].clamp(0.0, f64::from(size[k] - 2)) as u32);
+    let [u, v] = [0, 1].map(|k| (at[k] - f64::from(cell[k])).clamp(0.0, 1.0));
+    let height = |i: u32, j: u32| f64::from(field.height(cell[0] + i, cell[1] + j));
+    let row = |j: u32| height(0, j) * (1.0 - u) + height(1, j) * u;
+    row(0) * (1.0 - v) + row(1) * v
+}
+
+impl Levels for Radial {
+    #[inline]
+    fn is_split(&self, level: u32, at: [i32; 2]) -> bool {
+        let away_m = |k: usize| {
+            let (first, last) = (f64::from(at[k] << level), f64::from((at[k] + 1) << level));
+            (first - self.eye[k]).max(self.eye[k] - last).max(0.0) * self.spacing[k]
+        };
+        let (x, z) = (away_m(0), away_m(1));
+        self.table.level(x * x + z * z + self.above_m2) < level
+    }
+
+    /// It begins half way from where the level begins to where the next one does, and ends there.
+    fn weight(&self, level: u32, at: [i32; 2]) -> f32 {
+        let Some(&[begin, end]) = self.begins_m.get(level as usize..).and_then(|levels| levels.first_chunk()) else {
+            return 0.0;
+        };
+        let [x, z] = [0, 1].map(|k| (f64::from(at[k]) - self.eye[k]) * self.spacing[k]);
+        let distance = (x * x + z * z + self.above_m2).sqrt();
+        let start = (begin + end) / 2.0;
+        if end.is_finite() && end > start { ((distance - start) / (end - start)).clamp(0.0, 1.0) as f32 } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn broken_tables_are_found_and_repaired_and_good_ones_stay() {
+        let mut seed = 3u32;
+        let mut random = |n: u32| {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            (seed >> 8) % n
+        };
+        let (mut broken, mut kept) = (0, 0);
+        for round in 0..500 {
+            let mut level = 0;
+            let step = 1 + random(9000);
+            let entry = |_| {
+                level = (level + u8::from(random(step) == 0)).min(6);
+                if round % 2 == 0 && random(5000) == 0 { random(7) as u8 } else { level }
+            };
+            let mut table = Table::new((0..20_000).map(entry).collect(), 1.0);
+            let before = table.clone();
+            match table.broken_at(0.05, 6) {
+                Some(_) => broken += 1,
+                None => kept += 1,
+            }
+            let was_broken = table.broken_at(0.05, 6).is_some();
+            table.repair(0.05, 6);
+            assert_eq!(table.broken_at(0.05, 6), None);
+            assert!(was_broken || table == before, "a good table was changed");
+            assert!(table.levels.iter().zip(&before.levels).all(|(new, old)| new <= old), "a level was raised");
+        }
+        assert!(broken > 50 && kept > 50, "{broken} broken, {kept} kept");
+    }
+
+    #[test]
+    fn doubling_levels_begin_at_doubled_distances() {
+        let table = Table::doubling(10.0, 5, 1.0);
+        for (distance, level) in [(0.0, 0), (9.0, 0), (11.5, 1), (22.0, 2), (79.0, 3), (81.0, 4), (161.0, 5), (1e9, 5)]
+        {
+            assert_eq!(table.level(distance * distance), level, "{distance} m");
+        }
+    }
+}

@@ -1,0 +1,441 @@
+//! The walk: one row of pages, strip by strip, quad by quad, nearest first (Finch & Bishop, §4.4 to 4.7).
+//!
+//! A strip steps along the minor direction (`u`, to the right below), its front edge on one line of constant `v`:
+//!
+//! ```text
+//!   ┌───────┬───────┐ · · behind: strips walked before       ─▸ u
+//!   │       │   ┌───┤ rear fill-in strip, drawn when         │
+//!   │   D   ├───┼───┤ the main strip splits after D          ▾ v
+//!   │       │   │   │ the main strip goes on here
+//!   └───────┴───┴───┘ front edge: stays where it is
+//! ```
+//!
+//! - **Split.** Where the square ahead is split, the quad before it is drawn with a middle on its leading side (D), a
+//!   strip of half the size fills the rear half as far as it can, and the strip goes on with half the step in the front
+//!   half. A page is begun as one strip of its own size, which splits at once where it must: that is the published
+//!   start of strips (§4.7).
+//! - **End.** A rear strip ends at the first place where the quad of twice its size need not be split: it could only
+//!   grow forward.
+//! - **Merge.** There the strip in front of it doubles its step: its next quad reaches back over both (E).
+//! - **Match.** In front of a quad of twice the size, two quads are drawn at once (C), which leave out the vertex that
+//!   its front edge has not. In front of quads of half the size the vertex between them is added (B).
+//!
+//! Which vertices are behind is asked of a line of marks: for each `u` the last `v` at which a vertex was used. It is
+//! the published map of vertices by frame, which needs one entry for each column only, as no strip looks further back.
+//! Rows of pages are walked independently: the front edge of the row behind follows from the level function, and its
+//! vertices are made again, as the paper copies them from page to page.
+
+use super::pages::{Pages, Row, Run, placed};
+use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
+use super::splits::Levels;
+use crate::draw::ExplicitVertex;
+use crate::draw::place::morphed_height;
+use crate::height::Field;
+
+/// Vertices and indices of a part of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stream {
+    /// Vertices, each once.
+    pub vertices: Vec<ExplicitVertex>,
+    /// Three a triangle, nearest first.
+    pub indices: Vec<u32>,
+}
+
+/// What every row of a frame is walked with.
+pub struct Ground<'a, L> {
+    /// The field.
+    pub field: &'a Field,
+    /// The pages to be drawn.
+    pub pages: &'a Pages,
+    /// The level function.
+    pub levels: &'a L,
+    /// All kinds of quads.
+    pub shapes: &'a Shapes,
+    /// The axis along which strips follow each other.
+    pub major: usize,
+    /// Where rays come from, samples.
+    pub eye: [f64; 2],
+    /// Whether vertices go over into the next level.
+    pub blends: bool,
+}
+
+/// A vertex that is used but not made yet.
+const UNMADE: u32 = u32::MAX;
+/// No vertex is used in a column.
+const UNUSED: i32 = -1;
+
+/// The last vertex used in a column.
+#[derive(Clone, Copy)]
+struct Mark {
+    v: i32,
+    vertex: u32,
+}
+
+/// A square by its level and place, counted from the run's first corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Square {
+    level: u32,
+    column: i32,
+    row: i32,
+}
+
+impl Square {
+    fn parent(self) -> Square {
+        Square { level: self.level + 1, column: self.column >> 1, row: self.row >> 1 }
+    }
+
+    /// One of the two children at the trailing side.
+    fn child(self, is_front: bool) -> Square {
+        Square { level: self.level - 1, column: 2 * self.column, row: 2 * self.row + i32::from(is_front) }
+    }
+
+    fn step(self, columns: i32) -> Square {
+        Square { column: self.column + columns, ..self }
+    }
+}
+
+/// The vertices of a quad's trailing side.
+#[derive(Clone, Copy)]
+struct Side {
+    back: u32,
+    middle: Option<u32>,
+    front: u32,
+}
+
+/// The run that is being walked.
+struct Walk<'a, L> {
+    ground: &'a Ground<'a, L>,
+    stream: Stream,
+    /// The first corner: on the line behind the row, at the run's first side.
+    origin: [i32; 2],
+    /// Steps along the minor and the major direction, ±1.
+    signs: [i32; 2],
+    /// Where rays come from, counted from the first corner.
+    eye: [f64; 2],
+    /// Length of the run.
+    length: i32,
+    /// By column.
+    marks: Vec<Mark>,
+    /// Vertices on the run's first side.
+    start: Vec<u32>,
+    has_behind: bool,
+    /// Whether the page beside the first one is drawn too.
+    has_beside: bool,
+    /// Whether (u, v) turns the other way than (x, z).
+    mirrored: bool,
+    /// Whether the run sticks out of the field.
+    sticks_out: bool,
+}
+
+impl<L: Levels> Ground<'_, L> {
+    /// Walks a row of pages.
+    pub fn walk(&self, row: &Row) -> Stream {
+        let (side, minor) = (self.pages.grid.side(), 1 - self.major);
+        let behind = |sign: i32, n: i32| (if sign > 0 { n } else { n + 1 }) * side;
+        let longest = row.runs.iter().map(|run| run.pages * side).max().unwrap_or(0);
+        let mut walk = Walk {
+            ground: self,
+            stream: Stream::default(),
+            origin: [0, behind(row.sign, row.row)],
+            signs: [0, row.sign],
+            eye: [0.0; 2],
+            length: 0,
+            marks: vec![Mark { v: UNUSED, vertex: UNMADE }; longest as usize + 1],
+            start: vec![UNMADE; side as usize + 1],
+            has_behind: false,
+            has_beside: false,
+            mirrored: false,
+            sticks_out: false,
+        };
+        let mut last_start = None;
+        for run in &row.runs {
+            walk.origin[0] = behind(run.sign, run.first);
+            walk.signs[0] = run.sign;
+            walk.length = run.pages * side;
+            walk.eye = [0, 1].map(|k| {
+                let along = self.eye[if k == 0 { minor } else { self.major }];
+                f64::from(walk.signs[k]) * (along - f64::from(walk.origin[k]))
+            });
+            // Two runs away from the same side share its vertices.
+            if last_start != Some(walk.origin[0]) {
+                walk.start.fill(UNMADE);
+            }
+            last_start = Some(walk.origin[0]);
+            walk.run(row, run);
+        }
+        walk.stream
+    }
+}
+
+impl<L: Levels> Ground<'_, L> {
+    /// The vertex at a position: the same wherever it is asked for. Its target is the middle of the edge of the next
+    /// level on which it lies, as that edge is drawn (Finch & Bishop, §4.9).
+    fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
+        let [x, z] = position;
+        let height = self.field.height(x as u32, z as u32);
+        let still = ExplicitVertex { position, height, target: height, ..ExplicitVertex::default() };
+        let level = (x | z).trailing_zeros();
+        if !self.blends || level >= self.pages.grid.level {
+            return still;
+        }
+        let morph = self.levels.weight(level, position);
+        let apart = half_edge(position, level);
+        let ends = [-1, 1].map(|sign| [x + sign * apart[0], z + sign * apart[1]]);
+        let last = self.pages.grid.last;
+        // The field's edge is no vertex of the next level, unless it is whole there.
+        let is_inside =
+            (0..2).all(|k| ((position[k] >> (level + 1)) + i32::from(apart[k] != 0)) << (level + 1) <= last[k]);
+        if morph == 0.0 || !is_inside {
+            return still;
+        }
+        let [a, b] = ends.map(|end| self.vertex(end)).map(|v| morphed_height(v.height, v.target, v.morph));
+        ExplicitVertex { target: (a + b) * 0.5, morph, ..still }
+    }
+}
+
+/// From a vertex that a level is the coarsest to have to one end of the edge of the next level in whose middle it is.
+fn half_edge(position: [i32; 2], level: u32) -> [i32; 2] {
+    let step = 1 << level;
+    let mut apart = position.map(|n| n & step);
+    if apart == [step; 2] && ((position[0] >> (level + 1)) + (position[1] >> (level + 1))) & 1 == 1 {
+        apart[1] = -apart[1];
+    }
+    apart
+}
+
+impl<L: Levels> Walk<'_, L> {
+    fn run(&mut self, row: &Row, run: &Run) {
+        let Ground { pages, major, .. } = *self.ground;
+        let level = pages.grid.level;
+        let page = |row: i32, column: i32| placed(major, row, column);
+        // Positions grow with (u, v) or with (v, u).
+        self.mirrored = (self.signs[0] * self.signs[1] > 0) == (major == 0);
+        self.has_beside = pages.is_drawn(page(row.row, run.first - run.sign));
+        self.sticks_out = (0..2).any(|k| {
+            let end = if k == major { row.row } else { run.first.max(run.first + run.sign * (run.pages - 1)) } + 1;
+            end * pages.grid.side() > pages.grid.last[k]
+        });
+        self.marks[..=self.length as usize].fill(Mark { v: UNUSED, vertex: UNMADE });
+        for n in 0..run.pages {
+            if row.has_behind && pages.is_drawn(page(row.row - row.sign, run.first + n * run.sign)) {
+                self.mark_behind(Square { level, column: n, row: -1 });
+            }
+        }
+        self.has_behind = row.has_behind;
+        let side = Side { back: self.start_vertex(0), middle: None, front: self.start_vertex(pages.grid.side()) };
+        self.strip(Square { level, column: 0, row: 0 }, side);
+    }
+
+    /// Marks the vertices of the front edges behind the row.
+    fn mark_behind(&mut self, square: Square) {
+        if self.is_split(square) {
+            let child = square.child(true);
+            self.mark_behind(child);
+            return self.mark_behind(child.step(1));
+        }
+        for column in [square.column, square.column + 1] {
+            self.marks[(column << square.level) as usize].v = 0;
+        }
+    }
+
+    /// Draws a strip from a square on; its last back vertex. What it does at each square is the published pseudocode
+    /// of §4.6.
+    fn strip(&mut self, mut square: Square, mut side: Side) -> u32 {
+        // By level: where the rear strip of that level ended that lies behind this one.
+        let mut ended = [UNMADE; 32];
+        while square.column << square.level < self.length {
+            if self.is_parent_whole(square) {
+                if square.row & 1 == 0 {
+                    return side.back;
+                }
+                side = Side { back: ended[square.level as usize], middle: Some(side.back), front: side.front };
+                square = square.parent();
+            }
+            if square.column == 0 {
+                side.middle = self.start_middle(square);
+            }
+            if let (true, Some(middle)) = (self.is_split(square), side.middle) {
+                let rear = Side { back: side.back, middle: None, front: middle };
+                ended[square.level as usize - 1] = self.strip(square.child(false), rear);
+                side = Side { back: middle, middle: None, front: side.front };
+                square = square.child(true);
+            } else if self.matches_coarser(square) {
+                side = self.pair(square, side);
+                square = square.step(2);
+            } else {
+                side = self.quad(square, side);
+                square = square.step(1);
+            }
+        }
+        side.back
+    }
+
+    /// Whether the square of twice the size that begins here need not be split.
+    #[inline]
+    fn is_parent_whole(&self, square: Square) -> bool {
+        square.column & 1 == 0 && square.level < self.ground.pages.grid.level && !self.is_split(square.parent())
+    }
+
+    /// Whether the edge behind is that of a quad of twice the size: its front edge lacks the vertex between this
+    /// square and the next.
+    #[inline]
+    fn matches_coarser(&self, square: Square) -> bool {
+        let (u, v) = ((square.column + 1) << square.level, square.row << square.level);
+        let begins = square.level < self.ground.pages.grid.level && square.column & 1 == 0 && square.row & 1 == 0;
+        begins && self.marks[u as usize].v != v && self.has_land_behind(u, v)
+    }
+
+    /// Whether there is a quad behind a column of a strip: beyond the field's edge all are flat, and the page behind
+    /// the row may not be drawn, or later.
+    #[inline]
+    fn has_land_behind(&self, u: i32, v: i32) -> bool {
+        let Pages { grid, .. } = self.ground.pages;
+        let is_beyond = self.origin[1] + self.signs[1] * v >= grid.last[self.ground.major] && self.signs[1] < 0;
+        if v > 0 || is_beyond {
+            return !is_beyond;
+        }
+        let [x, z] = self.world(Square { level: 0, column: u, row: -1 });
+        self.has_behind && self.ground.pages.is_drawn([x >> grid.level, z >> grid.level])
+    }
+
+    /// The middle of a square's side on the run's first side, if either of its two squares is split.
+    fn start_middle(&mut self, square: Square) -> Option<u32> {
+        let is_needed = self.is_split(square) || self.has_beside && self.is_split(square.step(-1));
+        is_needed.then(|| self.start_vertex((2 * square.row + 1) << (square.level - 1)))
+    }
+
+    /// Draws a quad and returns its leading side.
+    #[inline]
+    fn quad(&mut self, square: Square, trailing: Side) -> Side {
+        let Square { level, column, row } = square;
+        let (size, half) = (1 << level, (1 << level) >> 1);
+        let [u, v] = [column << level, row << level];
+        let middle_behind = if half > 0 { self.behind(u + half, v) } else { None };
+        let back = self.behind(u + size, v).unwrap_or_else(|| self.vertex(u + size, v));
+        let is_split_ahead = u + size < self.length && self.is_split(square.step(1));
+        let middle = is_split_ahead.then(|| self.vertex(u + size, v + half));
+        let front = self.front_vertex(u + size, v + size);
+        let middles = [(middle_behind, BACK), (trailing.middle, TRAILING), (middle, LEADING)];
+        let mask = middles.iter().map(|(middle, bit)| if middle.is_some() { *bit } else { 0 }).sum();
+        let [e, f, g] = middles.map(|(middle, _)| middle.unwrap_or(UNMADE));
+        let shape = self.ground.shapes.single(mask, self.is_rising(square));
+        self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, UNMADE], [u, v], size);
+        Side { back, middle, front }
+    }
+
+    /// Draws two quads that match a coarser one behind and returns their leading side.
+    fn pair(&mut self, square: Square, trailing: Side) -> Side {
+        let Square { level, column, row } = square;
+        let size = 1 << level;
+        let [u, v] = [column << level, row << level];
+        let back = self.behind(u + 2 * size, v).unwrap_or_else(|| self.vertex(u + 2 * size, v));
+        let middle = self.front_vertex(u + size, v + size);
+        let front = self.front_vertex(u + 2 * size, v + size);
+        let mut slots = [UNMADE; 8];
+        slots[..4].copy_from_slice(&[trailing.back, back, front, trailing.front]);
+        slots[slot::M] = middle;
+        self.push(self.ground.shapes.pair(), slots, [u, v], size);
+        Side { back, middle: None, front }
+    }
+
+    /// The triangles of a quad, nearest first.
+    #[inline]
+    fn push(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32) {
+        let to_halves = 2.0 / f64::from(size);
+        let eye = [(self.eye[0] - f64::from(u)) * to_halves, (self.eye[1] - f64::from(v)) * to_halves];
+        if self.sticks_out {
+            return self.push_collapsed(shape, slots, [u, v], size, eye);
+        }
+        let (mirrored, indices) = (self.mirrored, &mut self.stream.indices);
+        shape.visit_in_order(shape.places, eye, |[a, b, c]| {
+            indices.extend(if mirrored { [a, c, b] } else { [a, b, c] }.map(|slot| slots[slot]));
+        });
+    }
+
+    /// The same where vertices may lie elsewhere than in their shape: triangles without area are left out.
+    #[cold]
+    fn push_collapsed(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
+        let (major, last) = (self.ground.major, self.ground.pages.grid.last);
+        let collapsed = |k: usize, first: i32, halves: f64| {
+            let along = f64::from(first) + halves * f64::from(size) / 2.0;
+            let position = f64::from(self.origin[k]) + f64::from(self.signs[k]) * along;
+            let position = position.min(f64::from(last[if k == 0 { 1 - major } else { major }]));
+            ((position - f64::from(self.origin[k])) * f64::from(self.signs[k]) - f64::from(first)) * 2.0
+                / f64::from(size)
+        };
+        let places = shape.places.map(|[along, forward]| [collapsed(0, u, along), collapsed(1, v, forward)]);
+        let (mirrored, Stream { vertices, indices }) = (self.mirrored, &mut self.stream);
+        shape.visit_in_order(&places, eye, |[a, b, c]| {
+            let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|slot| slots[slot]);
+            if has_area(vertices, triangle) {
+                indices.extend(triangle);
+            }
+        });
+    }
+
+    /// Whether the diagonal goes from B to D, see [`rtin`](crate::height::rtin).
+    #[inline]
+    fn is_rising(&self, square: Square) -> bool {
+        let [x, z] = self.world(square);
+        ((x + z) & 1 == 0) == (self.signs[0] * self.signs[1] < 0)
+    }
+
+    #[inline]
+    fn is_split(&self, square: Square) -> bool {
+        self.ground.levels.is_split(square.level, self.world(square))
+    }
+
+    /// A square's place on the lattice.
+    #[inline]
+    fn world(&self, square: Square) -> [i32; 2] {
+        let place = |k: usize, n: i32| {
+            let first = self.origin[k] >> square.level;
+            if self.signs[k] > 0 { first + n } else { first - 1 - n }
+        };
+        placed(self.ground.major, place(1, square.row), place(0, square.column))
+    }
+
+    /// The vertex behind, if it is used.
+    #[inline]
+    fn behind(&mut self, u: i32, v: i32) -> Option<u32> {
+        let mark = self.marks[u as usize];
+        if mark.v != v {
+            return None;
+        }
+        if mark.vertex == UNMADE {
+            self.marks[u as usize].vertex = self.vertex(u, v);
+        }
+        Some(self.marks[u as usize].vertex)
+    }
+
+    /// A new vertex on the strip's front edge.
+    #[inline]
+    fn front_vertex(&mut self, u: i32, v: i32) -> u32 {
+        let vertex = self.vertex(u, v);
+        self.marks[u as usize] = Mark { v, vertex };
+        vertex
+    }
+
+    fn start_vertex(&mut self, v: i32) -> u32 {
+        if self.start[v as usize] == UNMADE {
+            self.start[v as usize] = self.vertex(0, v);
+        }
+        self.start[v as usize]
+    }
+
+    /// A new vertex: what sticks out of the field collapses onto its edge.
+    #[inline]
+    fn vertex(&mut self, u: i32, v: i32) -> u32 {
+        let [u, v] = [self.origin[0] + self.signs[0] * u, self.origin[1] + self.signs[1] * v];
+        let (at, last) = (placed(self.ground.major, v, u), self.ground.pages.grid.last);
+        let position = [at[0].min(last[0]), at[1].min(last[1])];
+        self.stream.vertices.push(self.ground.vertex(position));
+        self.stream.vertices.len() as u32 - 1
+    }
+}
+
+/// Whether a triangle has any area in plan.
+fn has_area(vertices: &[ExplicitVertex], triangle: [u32; 3]) -> bool {
+    let [a, b, c] = triangle.map(|k| vertices[k as usize].position.map(i64::from));
+    (b[1] - a[1]) * (c[0] - a[0]) != (b[0] - a[0]) * (c[1] - a[1])
+}

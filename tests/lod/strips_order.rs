@@ -1,0 +1,194 @@
+//! Sorted strips on the screen: along the ray of every pixel triangles come in order, and what the painter's
+//! algorithm makes of that without a depth buffer.
+
+use std::sync::Arc;
+
+use cuesta::draw::expand::{self, Drawn};
+use cuesta::draw::layout::Frame;
+use cuesta::draw::{DrawList, Geometry};
+use cuesta::height::{Field, synth};
+use cuesta::lod::Technique;
+use cuesta::measure::watertight;
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::technique;
+
+/// Pixels of a small picture.
+const SIZE: [u32; 2] = [48, 32];
+
+/// What the rays of a picture's pixels meet.
+#[derive(Debug, Default, Clone, Copy)]
+struct Met {
+    /// Pixels with land.
+    land: usize,
+    /// Pixels whose ray meets several triangles.
+    several: usize,
+    /// Of these, those whose triangles do not come nearest first.
+    unsorted: usize,
+    /// Pixels that show another triangle without a depth buffer, drawn back to front.
+    wrong: usize,
+}
+
+impl Met {
+    fn plus(self, other: Met) -> Met {
+        let [a, b] = [self, other];
+        let (land, several) = (a.land + b.land, a.several + b.several);
+        Met { land, several, unsorted: a.unsorted + b.unsorted, wrong: a.wrong + b.wrong }
+    }
+}
+
+fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> Vec<Drawn> {
+    let mut list = DrawList::default();
+    technique.select(view, &mut list);
+    expand::triangles(field, &Frame::placing(field, view), &Geometry::default(), &list)
+}
+
+/// Where rays of a view begin and lead.
+fn ray(view: &View, pixel: DVec2) -> (DVec3, DVec3) {
+    let offset = (pixel - DVec2::new(f64::from(SIZE[0]), f64::from(SIZE[1])) / 2.0) / view.focal_px();
+    let across = view.world_from_eye * DVec3::new(offset.x, -offset.y, 0.0);
+    match view.lens {
+        Lens::Perspective { .. } => (view.eye, view.forward() + across),
+        Lens::Orthographic { .. } => (view.eye + across, view.forward()),
+    }
+}
+
+/// How far along a ray it meets a triangle.
+fn distance(corners: &[DVec3; 3], (from, towards): (DVec3, DVec3)) -> Option<f64> {
+    let [a, b, c] = corners;
+    let (side, other) = (*b - *a, *c - *a);
+    let across = towards.cross(other);
+    let scale = side.dot(across);
+    let offset = from - *a;
+    let u = offset.dot(across) / scale;
+    let turned = offset.cross(side);
+    let v = towards.dot(turned) / scale;
+    let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+    inside.then(|| other.dot(turned) / scale)
+}
+
+/// Follows the ray of every pixel through triangles that come nearest first.
+fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> Met {
+    let corners: Vec<[DVec3; 3]> =
+        triangles.iter().map(|t| t.corners.map(|c| field.world_at(c.x.into(), c.z.into(), c.y.into()))).collect();
+    let pixels = (0..SIZE[0] * SIZE[1]).into_par_iter();
+    let of_pixel = |k: u32| {
+        let centre = DVec2::new(f64::from(k % SIZE[0]) + 0.5, f64::from(k / SIZE[0]) + 0.5);
+        let ray = ray(view, centre);
+        let met: Vec<f64> = corners.iter().filter_map(|c| distance(c, ray)).filter(|&t| t > view.near).collect();
+        let Some(nearest) = met.iter().copied().reduce(f64::min) else { return Met::default() };
+        // On a common edge two triangles are as far.
+        let slack = 1e-9 * nearest.abs();
+        let unsorted = met.windows(2).any(|pair| pair[0] > pair[1] + slack);
+        let wrong = met[0] > nearest + slack;
+        Met { land: 1, several: usize::from(met.len() > 1), unsorted: unsorted.into(), wrong: wrong.into() }
+    };
+    pixels.map(of_pixel).reduce(Met::default, Met::plus)
+}
+
+fn view(eye: DVec3, rotation: glam::DMat3, lens: Lens) -> View {
+    let tolerance = Tolerance { px: 0.7, metric: Metric::Certified };
+    View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance, time_s: 0.0 }
+}
+
+fn land() -> Arc<Field> {
+    let mut field = synth::synth(synth::Kind::Fractal, [201, 170], 3);
+    field.spacing = [20.0, 20.0];
+    Arc::new(field)
+}
+
+/// From beyond the land's corners, or of parallel rays: no row or column of pages has the eye on two sides.
+fn from_outside(field: &Field) -> Vec<View> {
+    let [w, h] = field.size().map(|n| f64::from(n - 1));
+    let range = field.statistics();
+    let (middle, extent) = (field.world_at(w / 2.0, h / 2.0, range.mean), 20.0 * w.hypot(h));
+    let height = f64::from(range.max - range.min);
+    let around = (0..12).flat_map(|k| {
+        let (sin, cos) = f64::from(90 * (k % 4) + 40 + 3 * (k / 4)).to_radians().sin_cos();
+        let away = |part: f64| middle + DVec3::new(cos * extent * part, height * 0.7, sin * extent * part);
+        let towards = View::looking_along(middle - away(1.0));
+        let parallel = Lens::Orthographic { width: extent * 0.7, far: 1e6 };
+        [view(away(0.62), towards, Lens::Perspective { fov_x: 1.0 }), view(away(1.0), towards, parallel)]
+    });
+    around.collect()
+}
+
+/// From within the land, low above it, in all directions; steeply down, and rolled.
+fn from_inside(field: &Field) -> Vec<View> {
+    let at = |x: u32, z: u32, above: f64| field.world(x, z) + DVec3::Y * above;
+    let lens = Lens::Perspective { fov_x: 1.4 };
+    let around = (0..24).map(|k| {
+        let (x, z) = (20 + k * 37 % 160, 20 + k * 53 % 130);
+        view(at(x, z, 25.0), View::turned(f64::from(k) * 15.0, -8.0, 0.0), lens)
+    });
+    let down = (0..6).map(|k| view(at(70, 90, 300.0), View::turned(f64::from(k) * 60.0, -75.0, 30.0), lens));
+    around.chain(down).collect()
+}
+
+fn met(field: &Arc<Field>, views: &[View], settings: &[&str]) -> Met {
+    let mut strips = technique(field, "sorted-strips", settings);
+    let of_view = |view: &View| {
+        let triangles = drawn(field, strips.as_mut(), view);
+        watertight::prove(field, &view.frustum(), &triangles).unwrap();
+        follow(field, view, &triangles)
+    };
+    views.iter().map(of_view).fold(Met::default(), Met::plus)
+}
+
+#[test]
+fn from_outside_every_ray_meets_triangles_in_order() {
+    let field = land();
+    for settings in [["level=certified", "page=16"], ["level=certified", "page=64"], ["level=uniform", "page=64"]] {
+        let met = met(&field, &from_outside(&field), &settings);
+        println!("{settings:?}: {met:?}");
+        assert!(met.several > 500, "rays meet several triangles: {met:?}");
+        assert_eq!((met.unsorted, met.wrong), (0, 0), "{settings:?}");
+    }
+}
+
+#[test]
+fn from_inside_what_is_out_of_order_is_counted() {
+    let field = land();
+    for settings in [["level=certified", "page=16"], ["level=certified", "page=64"], ["level=uniform", "page=64"]] {
+        let met = met(&field, &from_inside(&field), &settings);
+        println!("{settings:?}: {met:?}");
+        assert!(met.several > 500 && met.unsorted * 1000 <= met.land, "{settings:?}: {met:?}");
+    }
+}
+
+/// The list as it is, and turned round: the same triangles, the last one first.
+#[test]
+fn back_to_front_is_the_same_list_turned_round() {
+    let field = land();
+    for view in from_inside(&field).iter().step_by(3) {
+        let [front, mut back] = ["order=front", "order=back"]
+            .map(|order| drawn(&field, technique(&field, "sorted-strips", &[order]).as_mut(), view));
+        back.reverse();
+        let corners = |drawn: &[Drawn]| drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z))).collect::<Vec<_>>();
+        let turned = |t: &[(i32, i32); 3]| [*t, [t[1], t[2], t[0]], [t[2], t[0], t[1]]].into_iter().min();
+        let sets = [&front, &back].map(|drawn| corners(drawn).iter().map(turned).collect::<Vec<_>>());
+        assert!(!front.is_empty() && sets[0] == sets[1]);
+    }
+}
+
+#[test]
+fn on_one_core_the_list_is_the_same() {
+    let field = land();
+    let mut rows = 0;
+    for level in ["level=certified", "level=uniform"] {
+        for view in from_inside(&field) {
+            let [parallel, serial] = ["sorted-strips", "sorted-strips:serial"].map(|name| {
+                let mut list = DrawList::default();
+                technique(&field, name, &[level, "page=16"]).select(&view, &mut list);
+                list
+            });
+            assert!(parallel.draws == serial.draws);
+            assert_eq!(parallel.streamed.indices, serial.streamed.indices);
+            assert_eq!(parallel.streamed.vertices, serial.streamed.vertices);
+            rows += parallel.draws.len();
+        }
+    }
+    assert!(rows > 200, "{rows} rows of pages");
+}
