@@ -216,7 +216,7 @@ impl Flights {
             let path = paths::find(&case.path).with_context(|| format!("no path {}", case.path))?;
             (self.scene, self.poses, self.near) = (case.scene(), path.poses(field, case.frames), paths::near(field));
         }
-        Ok(self.poses.iter().map(|pose| pose.view(case.size, self.near, case.tolerance())).collect())
+        Ok(paths::views(&self.poses, self.near, case.size, case.tolerance()))
     }
 }
 

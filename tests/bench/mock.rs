@@ -71,6 +71,7 @@ impl Laboratory for Mock {
 
     fn measure(&mut self, scene: &Scene) -> Result<Errors> {
         self.calls.push(format!("measure {}", scene.case));
+        assert!(scene.views.windows(2).all(|pair| pair[0].time_s < pair[1].time_s), "the scene's time goes on");
         let case = scene.case;
         let is_truth = case.technique == "brute-force";
         let is_paper = case.metric == "paper";

@@ -15,7 +15,7 @@ pub struct Form {
     pub settings: Settings,
 }
 
-/// Every combination of an entry's settings, and each variant with the default ones and with each single one: a
+/// Every combination of an entry's settings that says something, and each variant with the default ones and with each single one: a
 /// variant changes how a list is submitted.
 pub fn forms(entry: &'static Entry) -> Vec<Form> {
     let mut choices: Vec<Vec<(String, String)>> = vec![Vec::new()];
@@ -28,7 +28,7 @@ pub fn forms(entry: &'static Entry) -> Vec<Form> {
         };
         choices = choices.iter().flat_map(with).collect();
     }
-    let whole = choices.iter().map(|choice| form(entry, None, choice));
+    let whole = choices.iter().filter(|choice| !is_idle(entry, choice)).map(|choice| form(entry, None, choice));
     let single = entry
         .settings
         .iter()
@@ -36,6 +36,13 @@ pub fn forms(entry: &'static Entry) -> Vec<Form> {
     let single: Vec<_> = std::iter::once(Vec::new()).chain(single).collect();
     let of_variant = |variant: &'static Variant| single.iter().map(|choice| form(entry, Some(variant.name), choice));
     whole.chain(entry.variants.iter().flat_map(of_variant)).collect()
+}
+
+/// Whether a choice sets a clock that drives nothing: the same as with the default one.
+fn is_idle(entry: &Entry, choice: &[(String, String)]) -> bool {
+    let chosen = |key: &str| choice.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str());
+    let default = entry.settings.iter().find(|setting| setting.key == "clock").map(|setting| setting.default);
+    chosen("morph") == Some("off") && chosen("clock") != default
 }
 
 /// The values that a setting is tried at: every word, and for a number one far below its default, since a length
