@@ -23,7 +23,7 @@ void main() {
         tally.draws = is_drawn ? 1 : 0;
         commands[0] = of_seed(0, 0, 1);
         instances[0] = placed(Node(tree.root, uvec2(0)), tree.root);
-        instances[0].cells = 2 * tree.cells;
+        if (tree.skirts == 0) instances[0].cells = 2 * tree.cells;
         return;
     }
     uint draws = 0, first = 0;

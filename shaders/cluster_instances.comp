@@ -3,28 +3,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 #include "cluster_output.glsl"
-
-// src/draw/weights.rs
-const uint ONE = 64;
-const uint FINER = 128;
-const uint STITCHED = 128;
-
-// Whether a node is split, and how far the blocks in it have gone over into it: refine.rs, weight.
-bool weight(Node node, out uint found) {
-    found = 0;
-    uint place = find(node);
-    if (place == NONE) return false;
-    precise float part = uintBitsToFloat(work[tree.ratios + place]) - 1.0;
-    precise float scaled = part * view.band_scale;
-    if (view.band_scale != 0.0 && !is_partial(node)) found = uint(clamp(scaled, 0.0, float(ONE - 1)));
-    return true;
-}
-
-uint weight_or_none(Node node) {
-    uint found;
-    weight(node, found);
-    return found;
-}
+#include "cluster_weights.glsl"
+#include "cluster_skirts.glsl"
 
 // refine.rs, side_weight.
 uint side_weight(Node node, uint side) {
@@ -33,16 +13,6 @@ uint side_weight(Node node, uint side) {
     if (!beyond(node, side, other)) return own;
     if (weight(other, found)) return max(own, found);
     return draws(other) ? ONE + weight_or_none(parent(other)) : own;
-}
-
-uvec4 weights;
-
-void set(uint word, uint at, uint value) {
-    weights[word] |= value << (8 * at);
-}
-
-uint state_at(uint state, uint quadrant) {
-    return state / (quadrant == 0 ? 1 : quadrant == 1 ? 3 : quadrant == 2 ? 9 : 27) % 3;
 }
 
 // The seam between two quadrants; the second lies beyond this side of the first.
@@ -64,13 +34,7 @@ void set_quadrant(Node node, uint state, uint quadrant) {
     set(1 + lower, 2 + right, side_weight(block, 1 + 2 * lower));
 }
 
-void main() {
-    uint k = gl_GlobalInvocationID.x;
-    if (scratch.overflow != 0 || k >= scratch.splits) return;
-    uint state = work[tree.clusters + 2 * k];
-    if (state == 0) return;
-    Node node = node_at(work[tree.list + k]);
-    weights = uvec4(0);
+void stitch(Node node, uint state) {
     for (uint quadrant = 0; quadrant < 4; ++quadrant) {
         if (state_at(state, quadrant) != NOTHING) set_quadrant(node, state, quadrant);
     }
@@ -78,6 +42,17 @@ void main() {
     set_seam(node, state, 1, 2, 3, 2);
     set_seam(node, state, 2, 0, 2, 3);
     set_seam(node, state, 3, 1, 3, 3);
+}
+
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (scratch.overflow != 0 || k >= scratch.splits) return;
+    uint state = work[tree.clusters + 2 * k];
+    if (state == 0) return;
+    Node node = node_at(work[tree.list + k]);
+    weights = uvec4(0);
+    if (tree.skirts != 0) hang_skirts(node, state);
+    else stitch(node, state);
     uint at = work[tree.counts + 2 * seed_of(state) + 1] + work[tree.clusters + 2 * k + 1];
     Instance instance = placed(node, node.level - 1);
     instance.turns = turns_of(state);

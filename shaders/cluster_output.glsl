@@ -20,8 +20,9 @@ uint turns_of(uint state) {
     return words[tree.states + state] >> 8;
 }
 
-// An instance at a node's first vertex, two mesh units a cell of a level.
+// An instance at a node's first vertex, two mesh units a cell of a level. Meshes with skirts: src/draw/skirts.rs.
 Instance placed(Node node, uint level) {
     ivec2 origin = ivec2(node.at * side_of(node.level));
-    return Instance(origin, 4 * tree.cells, int(level) - 1, 0, level, 0, uvec4(0));
+    uint cells = tree.skirts == 0 ? 4 * tree.cells : 4 * tree.cells + 5;
+    return Instance(origin, cells, int(level) - 1, 0, level, 0, uvec4(0));
 }

@@ -172,11 +172,12 @@ float farthest_aside(Extent extent) {
     return root(max(square, LEAST));
 }
 
-float ratio(Extent extent, float error) {
+// What a tolerance that makes this scale allows over an error.
+float allowed_over(float scale, Extent extent, float error) {
     if (error == 0.0) return WITHOUT_ERROR;
     float distance = max(distance_of(extent), view.near);
     float over = 1.0;
-    float under = view.scale;
+    float under = scale;
     if (view.metric == CERTIFIED) {
         vec3 sums = along(view.forward, extent);
         precise float slack = SLACK * sums.z;
@@ -186,7 +187,7 @@ float ratio(Extent extent, float error) {
         precise float widest = view.corner * depth;
         float aside = min(farthest_aside(extent), widest);
         precise float square = depth * depth;
-        precise float across = view.scale * aside;
+        precise float across = scale * aside;
         precise float down = view.lean * depth;
         precise float sum = across + down;
         over = square;
@@ -200,6 +201,10 @@ float ratio(Extent extent, float error) {
     precise float once = guarded * r;
     precise float twice = once * r;
     return twice;
+}
+
+float ratio(Extent extent, float error) {
+    return allowed_over(view.scale, extent, error);
 }
 
 // Whether any of the finest blocks in a node that lies to what can be seen as `found` says may be seen.

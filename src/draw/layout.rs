@@ -203,6 +203,8 @@ shared! {
         band_scale: float,
         /// Whether nodes outside the planes are left as they are.
         culls: uint,
+        /// As `scale`, over the pixels that skirts hang down further than the gap.
+        skirt_scale: float,
     }
 
     /// What does not change of the quadtree of clusters. Offsets count words after this struct.
@@ -217,6 +219,9 @@ shared! {
         root: uint,
         /// Whether squares that the end of a tiled field cuts have their whole range as error.
         cuts: uint,
+        /// Whether blocks have skirts, and whether their errors are their squares': 0: no skirts; 1: they are; 2: they
+        /// are not.
+        skirts: uint,
         /// The most nodes that may be split.
         most: uint,
         /// Places in the table of split nodes: a power of two.

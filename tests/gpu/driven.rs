@@ -33,7 +33,8 @@ fn set(list: &DrawList) -> Set {
 
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morphs());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
+    let plan = plan.with_morph(technique.morphs()).with_seams(technique.seams());
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
 }
 
@@ -123,7 +124,12 @@ fn on_every_frame_of_a_path_device_and_host_select_alike() {
         let (demo, rough) = (Arc::new(demo::demo()), Arc::new(half_rough([600, 513])));
         for (name, field) in [("demo", demo), ("rough", rough)] {
             for path in ["skim", "circle"] {
-                for settings in [["block=16", "morph=off"], ["block=8", "morph=on"]] {
+                let ways = [
+                    ["block=16", "morph=off", "seams=stitched"],
+                    ["block=8", "morph=on", "seams=stitched"],
+                    ["block=8", "morph=on", "seams=skirts"],
+                ];
+                for settings in ways {
                     let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
                     let views = paths::find(path).unwrap().views(&field, 24, SIZE, tolerance);
                     let instances = compare(gpu, &field, &settings, &views);
@@ -153,13 +159,21 @@ fn from_anywhere_on_any_field_device_and_host_select_alike() {
         for (name, field) in fields {
             let views: Vec<_> = (0..8).map(|_| anywhere(&field, &mut seed)).collect();
             for block in ["block=8", "block=16", "block=32", "block=64", "block=128"] {
-                for setting in ["morph=off", "morph=on", "error=halved"] {
+                let ways: [(&str, &str); 6] = [
+                    ("seams=stitched", "morph=off"),
+                    ("seams=stitched", "morph=on"),
+                    ("seams=stitched", "error=halved"),
+                    ("seams=skirts", "morph=off"),
+                    ("seams=skirts", "morph=on"),
+                    ("seams=skirts", "error=halved"),
+                ];
+                for (seams, setting) in ways {
                     // A morph all around a field without end is more than any list holds.
                     if name.starts_with("500") && setting == "morph=on" {
                         continue;
                     }
-                    let instances = compare(gpu, &field, &[block, setting], &views);
-                    println!("{name}, {block}, {setting}: {instances} instances");
+                    let instances = compare(gpu, &field, &[block, seams, setting], &views);
+                    println!("{name}, {block}, {seams}, {setting}: {instances} instances");
                 }
             }
         }

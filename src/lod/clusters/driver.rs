@@ -10,7 +10,8 @@
 
 use super::mesh::Mesh;
 use super::states::Seeds;
-use super::tree::Tree;
+use super::tree::{Errors, Tree};
+use crate::draw::Seams;
 use crate::draw::driver::{Driver, Groups, Step};
 use crate::draw::layout::{ClusterScratch, ClusterTree, ClusterView};
 
@@ -51,7 +52,14 @@ impl Room {
 }
 
 /// The selection of clusters of a quadtree, at most `most` nodes of it split. `None` if no device need be able to.
-pub fn driver(tree: &Tree, cells: u32, seeds: &Seeds, mesh: &Mesh, most: usize) -> Option<Driver> {
+pub fn driver(
+    tree: &Tree,
+    cells: u32,
+    seams: Seams,
+    seeds: &Seeds,
+    mesh: &Mesh,
+    most: usize,
+) -> Option<Driver> {
     let root = tree.root().level;
     if root >= MOST_LEVELS {
         return None;
@@ -64,6 +72,11 @@ pub fn driver(tree: &Tree, cells: u32, seeds: &Seeds, mesh: &Mesh, most: usize) 
         cells,
         root,
         cuts: u32::from(tree.bounds.has_errors()),
+        skirts: match (seams, tree.errors) {
+            (Seams::Shared, _) => 0,
+            (Seams::Skirts, Errors::Measured) => 1,
+            (Seams::Skirts, Errors::Halved(_)) => 2,
+        },
         most: most as u32,
         places: places as u32,
         seeds: mesh.ranges.len() as u32,

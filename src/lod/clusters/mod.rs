@@ -51,7 +51,7 @@ use crate::view::View;
 const MORPH_RATIO: f32 = 1.3;
 
 /// The most blocks drawn, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
-const MOST_BLOCKS: usize = 1 << 17;
+const MOST_BLOCKS: usize = 1 << 16;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -63,7 +63,7 @@ pub const ENTRY: Entry = Entry {
         Variant { name: "draw-per-cluster", about: "a recorded draw a cluster, as published" },
         Variant {
             name: "gpu-driven",
-            about: "the device selects: no work a node on the host (with skirts the host does)",
+            about: "the device selects: no work a node on the host",
         },
     ],
     settings: &[
@@ -148,8 +148,8 @@ impl Clusters {
             // A split node draws at most one, and a lone root is one too.
             _ => most_splits.max(1),
         };
-        let is_driven = mode == Mode::GpuDriven && seams == Seams::Shared;
-        let driver = is_driven.then(|| driver::driver(&tree, cells, &seeds, &mesh, most_splits)).flatten();
+        let is_driven = mode == Mode::GpuDriven;
+        let driver = is_driven.then(|| driver::driver(&tree, cells, seams, &seeds, &mesh, most_splits)).flatten();
         let (refinement, drawn) = (Refinement::new(most_splits), Vec::new());
         Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, band_end, seams, measured, drawn }
     }
@@ -167,7 +167,7 @@ impl Clusters {
             let sight = Sight::new(&self.tree, &wider, self.band_end, !self.morph);
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-                let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement, view));
+                let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement));
                 Collapse { sight: &sight, refinement, seeds, cells: self.cells, single, skirts }.run(&mut drawn);
                 break;
             }

@@ -15,6 +15,7 @@
 
 use glam::Vec4;
 
+use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
 use crate::draw::layout::ClusterView;
 use crate::draw::place::Anchor;
@@ -78,19 +79,17 @@ impl<'a> Sight<'a> {
         Some(self.contained(&self.extent(node, square))[0])
     }
 
-    /// What the tolerance allows in a node over an error: below 1 that is too coarse. Never above the exact value.
-    /// `None` if it has no land.
-    pub fn ratio(&self, node: Node, error: f32) -> Option<f32> {
+    /// The error, metres, that [`RASTER_PX`] allow in a node. `None` if it has no land.
+    pub fn raster_m(&self, node: Node) -> Option<f32> {
         let square = self.tree.square(node)?;
-        Some(self.ratios(&self.extent(node, square), Vec4::splat(error)).x)
+        Some(self.over(self.view.skirt_scale, &self.extent(node, square), Vec4::ONE).x)
     }
 
     /// A node by itself.
     pub fn look(&self, node: Node) -> Look {
         let square = self.tree.square(node)?;
         let extent = self.extent(node, square);
-        let finest = node.level == 0;
-        let ratio = if finest { WITHOUT_ERROR } else { self.ratios(&extent, Vec4::splat(square.error)).x };
+        let ratio = if node.level == 0 { WITHOUT_ERROR } else { self.ratios(&extent, Vec4::splat(square.error)).x };
         Some((self.contained(&extent)[0], ratio))
     }
 
@@ -167,8 +166,15 @@ impl<'a> Sight<'a> {
         })
     }
 
+    /// What the tolerance allows over errors: below 1 they are too coarse. Never above the exact value.
     #[inline]
     fn ratios(&self, extents: &Extents, errors: Vec4) -> Vec4 {
+        self.over(self.view.scale, extents, errors)
+    }
+
+    /// The same for a scale as [`ClusterView::scale`].
+    #[inline]
+    fn over(&self, scale: f32, extents: &Extents, errors: Vec4) -> Vec4 {
         let view = &self.view;
         let near = Vec4::splat(view.near);
         let distance = distance(extents).max(near);
@@ -178,10 +184,10 @@ impl<'a> Sight<'a> {
                 let depth = (nearest - SLACK * size).max(distance * view.inverse_corner).max(near);
                 let depth = depth.min(Vec4::splat(DEEPEST));
                 let aside = farthest_aside(extents).min(view.corner * depth);
-                (depth * depth, view.scale * aside + view.lean * depth)
+                (depth * depth, scale * aside + view.lean * depth)
             }
-            PAPER => (distance.min(Vec4::splat(DEEPEST)), Vec4::splat(view.scale)),
-            _ => (Vec4::ONE, Vec4::splat(view.scale)),
+            PAPER => (distance.min(Vec4::splat(DEEPEST)), Vec4::splat(scale)),
+            _ => (Vec4::ONE, Vec4::splat(scale)),
         };
         let root = inverse_roots((under * errors.max(Vec4::splat(LEAST_ERROR))).max(Vec4::splat(LEAST)));
         let ratios = ((GUARD * over) * root) * root;
@@ -242,6 +248,7 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
         (Lens::Perspective { .. }, Metric::Paper) => (PAPER, 1.0),
         (Lens::Perspective { .. }, Metric::Certified) => (CERTIFIED, 1.0),
     };
+    let scale_for = |px: f64| single(scale * view.focal_px() / px);
     let corner = view.corner_ray();
     ClusterView {
         anchor: anchor.at,
@@ -259,11 +266,12 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
         near: view.near.clamp(1e-9, f64::from(DEEPEST)) as f32,
         corner: corner as f32,
         inverse_corner: (1.0 / corner) as f32,
-        scale: single(scale * view.focal_px() / view.tolerance.px.max(f64::MIN_POSITIVE)),
+        scale: scale_for(view.tolerance.px.max(f64::MIN_POSITIVE)),
         lean: single(lean),
         band_end,
         band_scale: if band_end > 1.0 { crate::draw::weights::ONE as f32 / (band_end - 1.0) } else { 0.0 },
         culls: culls.into(),
+        skirt_scale: scale_for(RASTER_PX),
     }
 }
 
@@ -357,7 +365,8 @@ mod tests {
                 let Some(square) = tree.square(node) else { continue };
                 let exact = world_box(&tree, node, square.range);
                 let error = 10f32.powf(6.0 * random(&mut seed) as f32 - 4.0);
-                let allowed = f64::from(sight.ratio(node, error).unwrap()) * f64::from(error);
+                let ratio = sight.ratios(&sight.extent(node, square), Vec4::splat(error)).x;
+                let allowed = f64::from(ratio) * f64::from(error);
                 let share = allowed / view.allowed_error(&exact).min(1e12);
                 assert!(share < 1.0, "{share} of the allowed error at {node:?}, {view:?}");
                 closest = closest.max(share);

@@ -7,18 +7,20 @@
 //! both go from sample to sample of the side, no more than the samples in the block are apart. Judnich & Ling 2012,
 //! section V.A, know such a bound on the screen.
 //!
-//! A little more is for the rasteriser, which may miss pixels between edges that meet in space but not in their vertices.
+//! A little more is for the rasteriser, which may miss pixels between edges that meet in space but not in their
+//! vertices.
+//!
+//! `shaders/cluster_skirts.glsl` has the same functions, to the bit.
 
 use super::refine::Refinement;
 use super::sight::Sight;
 use super::tree::{Node, SIDES};
 use crate::draw::skirts;
 use crate::draw::weights::{self, FINER, ONE};
-use crate::view::{Tolerance, View};
 
 /// How far the rasteriser may see edges apart that are not, pixels: it rounds vertices to 1/256 of one, and a skirt may be
 /// seen from almost above.
-const RASTER_PX: f64 = 0.125;
+pub const RASTER_PX: f64 = 0.125;
 
 /// Rounding of heights on their way: as `height::bounds` has it.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
@@ -27,8 +29,6 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 pub struct Skirts<'a> {
     sight: &'a Sight<'a>,
     refinement: &'a Refinement,
-    /// The same view under a tolerance of [`RASTER_PX`].
-    raster: Sight<'a>,
 }
 
 /// What tells the edge of a block from others.
@@ -42,10 +42,8 @@ struct Edge {
 
 impl<'a> Skirts<'a> {
     /// For a refinement in a view.
-    pub fn new(sight: &'a Sight<'a>, refinement: &'a Refinement, view: &View) -> Self {
-        let tolerance = Tolerance { px: RASTER_PX, ..view.tolerance };
-        let raster = Sight::new(sight.tree, &View { tolerance, ..*view }, 1.0, false);
-        Self { sight, refinement, raster }
+    pub fn new(sight: &'a Sight<'a>, refinement: &'a Refinement) -> Self {
+        Self { sight, refinement }
     }
 
     /// The weights of an instance of a level that draws these blocks, each in a quadrant: words 1 and 2 are its
@@ -77,9 +75,8 @@ impl<'a> Skirts<'a> {
         let [low, high] = tree.square(block)?.range;
         let [_, apart] = tree.deviation(block);
         let gap = (own.error_m + other.error_m).min(apart) + ROUNDING * low.abs().max(high.abs());
-        // What is allowed over an error of 1 m.
-        let allowed = self.raster.ratio(block, 1.0)?;
-        Some((gap + allowed.min(tree.cell_m(block.level) as f32)).next_up())
+        let further = self.sight.raster_m(block)?.min(tree.cell_m(block.level) as f32);
+        Some((gap + further) * (1.0 + f32::EPSILON))
     }
 
     /// What is drawn at a node: it, its parent or the blocks in it. Beyond the root is nothing.

@@ -90,7 +90,8 @@ impl Squares {
 pub struct Tree {
     /// What was measured of its squares.
     pub bounds: Bounds,
-    errors: Errors,
+    /// Where its errors come from.
+    pub errors: Errors,
     /// Distance of neighbouring samples (x, z), metres.
     pub spacing: [f64; 2],
     /// Where the first sample lies (x, z), world metres.
@@ -170,7 +171,8 @@ impl Tree {
     /// most by which two samples in it differ.
     pub fn deviation(&self, node: Node) -> [f32; 2] {
         let Square { error, range: [low, high] } = self.bounds.square(node.level, node.at);
-        let apart = (high - low).next_up();
+        // Rounded up, and nothing stays nothing.
+        let apart = (high - low) * (1.0 + f32::EPSILON);
         [if self.errors == Errors::Measured { error } else { apart }, apart]
     }
 

@@ -1,0 +1,88 @@
+// Where blocks have skirts, and how deep: src/lod/clusters/skirts.rs, name by name and to the bit.
+
+const float UP = 1.0 + 1.0 / 8388608.0;
+const float ROUNDING = 8.0 / 8388608.0;
+
+struct Edge { uint level; uint weight; float error_m; };
+
+// tree.rs, deviation: of what is known of a node, its error and how far its samples are apart.
+vec2 deviation(Square known) {
+    precise float height = known.range.y - known.range.x;
+    precise float apart = height * UP;
+    return vec2(tree.skirts == 1 ? known.error : apart, apart);
+}
+
+vec2 deviation(Node node) {
+    return deviation(measured(node));
+}
+
+Edge edge(Node block) {
+    Node node = parent(block);
+    float own = deviation(block).x;
+    uint found = node.level > tree.root ? 0 : weight_or_none(node);
+    if (found == 0) return Edge(block.level, 0, own);
+    precise float difference = deviation(node).x - own;
+    precise float part = difference * (float(found) / float(ONE));
+    precise float error_m = own + part;
+    return Edge(block.level, found, error_m);
+}
+
+// What is drawn at a node, if anything is: it, its parent or the blocks in it.
+bool edge_at(Node node, out Edge found) {
+    found = Edge(0, 0, 0.0);
+    if (node.level == tree.root) return false;
+    uint weight_there;
+    if (node.level > 0 && weight(node, weight_there)) {
+        bool is_any = false;
+        for (uint quadrant = 0; quadrant < 4; ++quadrant) {
+            Node block = child(node, quadrant);
+            Square known;
+            if (!square(block, known)) continue;
+            Edge one = edge(block);
+            found = Edge(one.level, one.weight, max(found.error_m, one.error_m));
+            is_any = true;
+        }
+        return is_any;
+    }
+    Node block = parent(node);
+    if (weight(block, weight_there)) block = node;
+    if (!draws(block)) return false;
+    found = edge(block);
+    return true;
+}
+
+// The most, metres, that a block can be apart from what is drawn beyond a side; negative if it is not at all.
+float gap_m(Node block, uint side) {
+    Node other;
+    Edge theirs;
+    Square known;
+    if (!beyond(block, side, other) || !edge_at(other, theirs)) return -1.0;
+    Edge own = edge(block);
+    if ((own.level == theirs.level && own.weight == theirs.weight) || !square(block, known)) return -1.0;
+    precise float both = own.error_m + theirs.error_m;
+    precise float rounding = ROUNDING * max(abs(known.range.x), abs(known.range.y));
+    precise float gap = min(both, deviation(known).y) + rounding;
+    float cell_m = max(view.spacing.x, view.spacing.y) * float(1u << block.level);
+    precise float depth = gap + min(allowed_over(view.skirt_scale, extent(block, known.range), 1.0), cell_m);
+    precise float rounded = depth * UP;
+    return rounded;
+}
+
+void hang_skirts(Node node, uint state) {
+    float depth = 0.0;
+    for (uint quadrant = 0; quadrant < 4; ++quadrant) {
+        uint holds = state_at(state, quadrant);
+        for (uint k = 0; k < (holds == BLOCK ? 1 : holds == FOUR_BLOCKS ? 4 : 0); ++k) {
+            Node block = child(node, quadrant);
+            if (holds == FOUR_BLOCKS) block = child(block, k);
+            set(0, quadrant, edge(block).weight | (holds == FOUR_BLOCKS ? FINER : 0));
+            for (uint side = 0; side < 4; ++side) {
+                float gap = gap_m(block, side);
+                if (gap < 0.0) continue;
+                weights[1] |= 1u << (4 * quadrant + side);
+                depth = max(depth, gap);
+            }
+        }
+    }
+    weights[2] = floatBitsToUint(depth);
+}

@@ -1,0 +1,32 @@
+// How far blocks have gone over into their parents: src/lod/clusters/refine.rs, and src/draw/weights.rs.
+
+const uint ONE = 64;
+const uint FINER = 128;
+const uint STITCHED = 128;
+
+// Whether a node is split, and how far the blocks in it have gone over into it: refine.rs, weight.
+bool weight(Node node, out uint found) {
+    found = 0;
+    uint place = find(node);
+    if (place == NONE) return false;
+    precise float part = uintBitsToFloat(work[tree.ratios + place]) - 1.0;
+    precise float scaled = part * view.band_scale;
+    if (view.band_scale != 0.0 && !is_partial(node)) found = uint(clamp(scaled, 0.0, float(ONE - 1)));
+    return true;
+}
+
+uint weight_or_none(Node node) {
+    uint found;
+    weight(node, found);
+    return found;
+}
+
+uvec4 weights;
+
+void set(uint word, uint at, uint value) {
+    weights[word] |= value << (8 * at);
+}
+
+uint state_at(uint state, uint quadrant) {
+    return state / (quadrant == 0 ? 1 : quadrant == 1 ? 3 : quadrant == 2 ? 9 : 27) % 3;
+}
