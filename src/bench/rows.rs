@@ -231,6 +231,23 @@ pub struct Errors {
     pub peers_px: Option<PeersError>,
     /// The frame with the largest screen error.
     pub worst: Option<Worst>,
+    /// What is beyond the tolerance because something finer was not there yet.
+    #[serde(default)]
+    pub waiting: Option<Waiting>,
+}
+
+/// Frames in which a refinement waited, counted apart: only there may a certified bound be exceeded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Waiting {
+    /// Such frames, of those measured.
+    pub frames: usize,
+    /// Those of them that kept the tolerance all the same.
+    pub kept: usize,
+    /// Their pixels beyond the tolerance.
+    pub pixels: u64,
+    /// How far beyond it the largest screen error of them is, pixels.
+    #[serde(with = "extended")]
+    pub excess_px: f64,
 }
 
 /// A quantity over all samples in view.

@@ -10,6 +10,7 @@ mod layout;
 mod neck;
 mod plan;
 mod skirts;
+mod soak;
 mod twin;
 
 use std::sync::Arc;

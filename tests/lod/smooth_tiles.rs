@@ -13,7 +13,7 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::technique;
+use super::{heights, technique};
 
 /// Scripts of random views.
 const SCRIPTS: u32 = 10_000;
@@ -179,4 +179,71 @@ fn one_chunk_a_frame_comes_to_the_same_land_as_all_at_once() {
         }
     }
     assert!(longest > 10, "something had to wait");
+}
+
+/// Frames of a way along which tiles only coarsen: the bound never hurries them.
+const COARSENING: u32 = 250;
+
+/// The furthest that the surface moved from one frame to the next over any sample, as a part of the field's range of
+/// heights, beyond what the clock says; and how far it moved at most. The clock's part counts twice, as a vertex goes
+/// with the inside and with a side, and so do the steps of weights.
+fn beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -> [f64; 2] {
+    let range = field.statistics();
+    let range_m = f64::from(range.max - range.min);
+    let centre = field.world_at(20.0, 18.0, 10.0);
+    let away = DVec3::new(0.6, 0.5, 0.62);
+    let (mut last, mut found, mut time_s) = (Vec::new(), [f64::MIN, 0.0], 0.0);
+    for k in 0..COARSENING {
+        // By speed the viewer goes away; else the tolerance leaps, and nothing but the clock goes on.
+        let [way_m, px] = if drive == "speed" { [f64::from(k), 2.0] } else { [0.0, if k == 0 { 0.3 } else { 40.0 }] };
+        let eye = centre + away * (150.0 + way_m);
+        let dt_s = [0.0, 0.01, 0.03][k as usize % 3];
+        time_s += dt_s;
+        let view = View {
+            eye,
+            world_from_eye: View::looking_along(-away),
+            lens: Lens::Perspective { fov_x: 1.5 },
+            size: [320, 320],
+            near: 0.1,
+            tolerance: Tolerance { px, metric: Metric::Certified },
+            time_s,
+        };
+        let mut list = DrawList::default();
+        technique.select(&view, &mut list);
+        // What waits for its first chunk moves as soon as that is there.
+        while k == 0 && !technique.is_settled() {
+            list.clear();
+            technique.select(&view, &mut list);
+        }
+        let now = heights(field, &view, technique.resident(), &list);
+        let nearest_m = eye.distance(centre) - 70.0;
+        let levels = match drive {
+            "speed" => 1.0 / (0.25 * nearest_m),
+            "time" => dt_s,
+            _ => 1.0 / 30.0,
+        };
+        let moved = last.iter().zip(&now).map(|(a, b): (&f64, &f64)| (a - b).abs() / range_m).fold(0.0, f64::max);
+        if k > 0 {
+            found = [found[0].max(moved - 2.0 * levels - 2.0 / f64::from(ONE)), found[1].max(moved)];
+        }
+        last = now;
+    }
+    found
+}
+
+#[test]
+fn nothing_moves_further_in_a_frame_than_the_clock_says() {
+    for field in fields() {
+        for drive in ["speed", "time", "frames"] {
+            let clock = format!("clock={drive}");
+            for rebuild in ["rebuild=1", "rebuild=100000"] {
+                let mut technique = technique(&field, "smooth-tiles", &["tile=9", &clock, rebuild]);
+                let [beyond, most] = beyond_the_clock(&field, &mut *technique, drive);
+                assert!(beyond <= 0.0, "{drive}, {rebuild}: {beyond} of the range beyond the clock");
+                assert!(most > 0.005, "{drive}, {rebuild}: it moves");
+            }
+            let mut at_once = technique(&field, "smooth-tiles", &["tile=9", "morph=off"]);
+            assert!(beyond_the_clock(&field, &mut *at_once, drive)[0] > 0.05, "at once it leaps");
+        }
+    }
 }

@@ -52,14 +52,7 @@ impl Room {
 }
 
 /// The selection of clusters of a quadtree, at most `most` nodes of it split. `None` if no device need be able to.
-pub fn driver(
-    tree: &Tree,
-    cells: u32,
-    seams: Seams,
-    seeds: &Seeds,
-    mesh: &Mesh,
-    most: usize,
-) -> Option<Driver> {
+pub fn driver(tree: &Tree, cells: u32, seams: Seams, seeds: &Seeds, mesh: &Mesh, most: usize) -> Option<Driver> {
     let root = tree.root().level;
     if root >= MOST_LEVELS {
         return None;

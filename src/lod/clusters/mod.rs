@@ -61,10 +61,7 @@ pub const ENTRY: Entry = Entry {
     variants: &[
         Variant { name: "draw-per-block", about: "a recorded draw a block: the paper's baseline, CLOD" },
         Variant { name: "draw-per-cluster", about: "a recorded draw a cluster, as published" },
-        Variant {
-            name: "gpu-driven",
-            about: "the device selects: no work a node on the host",
-        },
+        Variant { name: "gpu-driven", about: "the device selects: no work a node on the host" },
     ],
     settings: &[
         Setting {

@@ -87,6 +87,16 @@ pub const ENTRY: Entry = Entry {
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
 };
 
+/// Names of the figures of table 2: triangles that a tile has less than at level 0.
+const REDUCTIONS: [&str; 6] = [
+    "reduction at level 1",
+    "reduction at level 2",
+    "reduction at level 3",
+    "reduction at level 4",
+    "reduction at level 5",
+    "reduction at level 6",
+];
+
 struct SmoothTiles {
     field: Arc<Field>,
     tiles: Tiles,
@@ -287,10 +297,17 @@ impl Technique for SmoothTiles {
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
         let bytes = |count: usize| (count * size_of::<ExplicitVertex>()) as f64;
-        vec![
+        let whole = [
             ("tiles", self.tiles.total() as f64, ""),
+            ("chunks in use", self.queue.chunks() as f64, ""),
             ("vertex bytes on the device", bytes(self.queue.vertices()), "B"),
+            ("vertex bytes in use", bytes(self.queue.used_vertices()), "B"),
             ("index bytes", size_of_val(self.patterns.indices.as_slice()) as f64, "B"),
-        ]
+        ];
+        let reduction = |(level, name): (u32, &'static str)| {
+            let share = f64::from(self.patterns.triangles(level)) / f64::from(self.patterns.triangles(0));
+            (name, 100.0 * (1.0 - share), "%")
+        };
+        whole.into_iter().chain((1..self.tiles.levels).zip(REDUCTIONS).map(reduction)).collect()
     }
 }

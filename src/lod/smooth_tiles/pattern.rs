@@ -52,6 +52,11 @@ impl Patterns {
         borders[if is_single { usize::from(is_odd) } else { mask }].clone()
     }
 
+    /// Triangles of a level of a tile beside none that is coarser: 2^(2(w − l) + 1) (Larsen & Christensen, §2).
+    pub fn triangles(&self, level: u32) -> u32 {
+        (self.centres[level as usize].len() + self.border(level, 0, false).len()) as u32 / 3
+    }
+
     fn append(&mut self, n: i32, triangles: &[Triangle]) -> Range<u32> {
         let first = self.indices.len() as u32;
         self.indices.extend(triangles.iter().flatten().map(|&[x, z]| (z * (n + 1) + x) as u32));
@@ -116,10 +121,9 @@ mod tests {
     fn a_level_has_the_published_number_of_triangles() {
         let patterns = Patterns::new(32);
         for (level, percent) in [(0, 0.0), (1, 75.0), (2, 93.75), (3, 98.44), (4, 99.61)] {
-            let (centre, border) = (&patterns.centres[level], patterns.border(level as u32, 0, false));
-            let triangles = (centre.len() + border.len()) / 3;
+            let triangles = patterns.triangles(level);
             assert_eq!(triangles, 1 << (2 * (5 - level) + 1), "2^(2(w − l) + 1)");
-            let reduction = 100.0 * (1.0 - triangles as f64 / 2048.0);
+            let reduction = 100.0 * (1.0 - f64::from(triangles) / 2048.0);
             assert!((reduction - percent).abs() < 0.006, "table 2: {reduction} % at level {level}");
         }
         let single = [false, true].map(|is_odd| patterns.border(5, 15, is_odd));

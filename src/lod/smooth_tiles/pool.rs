@@ -16,6 +16,8 @@ pub struct Pool {
 
 struct Page {
     level: u32,
+    /// Slots in use.
+    held: usize,
     /// Free slots.
     free: Vec<u32>,
 }
@@ -28,7 +30,7 @@ impl Pool {
     pub fn new(sizes: Vec<usize>, vertices: usize) -> Self {
         let page = CHUNKS * sizes[0];
         let count = vertices.div_ceil(page) as u32;
-        let pages = (0..count).map(|_| Page { level: 0, free: Vec::new() }).collect();
+        let pages = (0..count).map(|_| Page { level: 0, held: 0, free: Vec::new() }).collect();
         let open = vec![Vec::new(); sizes.len()];
         Self { page, sizes, pages, empty: (0..count).rev().collect(), open }
     }
@@ -41,6 +43,11 @@ impl Pool {
     /// Vertices of all pages that are in use.
     pub fn used_vertices(&self) -> usize {
         (self.pages.len() - self.empty.len()) * self.page
+    }
+
+    /// Chunks in use.
+    pub fn held(&self) -> usize {
+        self.pages.iter().map(|page| page.held).sum()
     }
 
     /// Slots of a level in a page.
@@ -64,12 +71,13 @@ impl Pool {
             }
             let page = self.empty.pop()?;
             let slots = self.slots(level) as u32;
-            self.pages[page as usize] = Page { level, free: (0..slots).rev().collect() };
+            self.pages[page as usize] = Page { level, held: 0, free: (0..slots).rev().collect() };
             self.open[level as usize].push(page);
         }
         let page = *self.open[level as usize].last()?;
-        let free = &mut self.pages[page as usize].free;
+        let Page { ref mut held, ref mut free, .. } = self.pages[page as usize];
         let slot = free.pop()?;
+        *held += 1;
         if free.is_empty() {
             self.open[level as usize].pop();
         }
@@ -79,14 +87,15 @@ impl Pool {
     /// Gives back what [`Self::take`] gave.
     pub fn give(&mut self, first_vertex: u32) {
         let page = first_vertex / self.page as u32;
-        let Page { level, ref mut free } = self.pages[page as usize];
+        let Page { level, ref mut held, ref mut free } = self.pages[page as usize];
+        *held -= 1;
         free.push(first_vertex % self.page as u32 / self.sizes[level as usize] as u32);
-        let held = free.len();
+        let (held, left) = (*held, free.len());
         let open = &mut self.open[level as usize];
-        if held == 1 {
+        if left == 1 {
             open.push(page);
         }
-        if held == self.slots(level) {
+        if held == 0 {
             self.open[level as usize].retain(|other| *other != page);
             self.empty.push(page);
         }
@@ -129,6 +138,7 @@ mod tests {
             assert!(sorted.windows(2).all(apart), "chunks overlap");
             assert!(sorted.last().is_none_or(|&(first, k)| first as usize + sizes[k as usize] <= pool.vertices()));
         }
+        assert_eq!(pool.held(), held.len());
         while pool.take(0, 0).is_some() {}
         assert!(pool.take(0, 0).is_none() && !pool.holds(&[1, 0, 0, 0], 0), "it is full");
         let mut pool = Pool::new(sizes, 20 * 324);

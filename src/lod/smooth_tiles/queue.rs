@@ -63,6 +63,16 @@ impl Queue {
         self.pool.vertices()
     }
 
+    /// Chunks in the buffer: one a tile.
+    pub fn chunks(&self) -> usize {
+        self.pool.held()
+    }
+
+    /// Vertices of all pages of the buffer that are in use.
+    pub fn used_vertices(&self) -> usize {
+        self.pool.used_vertices()
+    }
+
     /// Whether the last frame rebuilt nothing: the next one will not either, for the same aims.
     pub fn is_at_rest(&self) -> bool {
         self.moves.is_empty()
