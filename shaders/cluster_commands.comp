@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 #include "cluster_output.glsl"
+#include "cluster_weights.glsl"
 
 Command of_seed(uint seed, uint first, uint count) {
     uint range = tree.ranges + 2 * seed;
@@ -24,6 +25,10 @@ void main() {
         commands[0] = of_seed(0, 0, 1);
         instances[0] = placed(Node(tree.root, uvec2(0)), tree.root);
         if (tree.skirts == 0) instances[0].cells = 2 * tree.cells;
+        if (view.metric == DISTANCE) {
+            // It goes nowhere.
+            instances[0].weights = uvec4(BY_DISTANCE * 0x01010101, 0, floatBitsToUint(ways[tree.root]), floatBitsToUint(view.above_squared));
+        }
         return;
     }
     uint draws = 0, first = 0;

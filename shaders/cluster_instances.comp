@@ -44,6 +44,14 @@ void stitch(Node node, uint state) {
     set_seam(node, state, 3, 1, 3, 3);
 }
 
+// src/draw/distance.rs, weights.
+void weigh_by_distance(uint level, uint state) {
+    for (uint quadrant = 0; quadrant < 4; ++quadrant) {
+        set(0, quadrant, BY_DISTANCE | (state_at(state, quadrant) == FOUR_BLOCKS ? FINER : 0));
+    }
+    weights.yzw = floatBitsToUint(vec3(ways[level + 1], ways[level], view.above_squared));
+}
+
 void main() {
     uint k = gl_GlobalInvocationID.x;
     if (scratch.overflow != 0 || k >= scratch.splits) return;
@@ -51,7 +59,8 @@ void main() {
     if (state == 0) return;
     Node node = node_at(work[tree.list + k]);
     weights = uvec4(0);
-    if (tree.skirts != 0) hang_skirts(node, state);
+    if (view.metric == DISTANCE) weigh_by_distance(node.level - 1, state);
+    else if (tree.skirts != 0) hang_skirts(node, state);
     else stitch(node, state);
     uint at = work[tree.counts + 2 * seed_of(state) + 1] + work[tree.clusters + 2 * k + 1];
     Instance instance = placed(node, node.level - 1);

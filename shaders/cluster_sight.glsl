@@ -4,7 +4,7 @@
 #include "layout.glsl"
 
 layout(set = 0, binding = 0, scalar) readonly buffer TreeBlock { ClusterTree tree; uint words[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer ViewBlock { ClusterView view; };
+layout(set = 0, binding = 1, scalar) readonly buffer ViewBlock { ClusterView view; float ways[]; };
 
 const float GUARD = 1.0 - 1.0 / 16384.0;
 const float SLACK = 1.0 / 524288.0;
@@ -15,6 +15,7 @@ const float LEAST_ERROR = 1e-12;
 const float WITHOUT_ERROR = 1e30;
 const uint CERTIFIED = 0;
 const uint PAPER = 1;
+const uint DISTANCE = 3;
 
 const int OUTSIDE = 0;
 const int CROSSING = 1;
@@ -203,7 +204,19 @@ float allowed_over(float scale, Extent extent, float error) {
     return twice;
 }
 
-float ratio(Extent extent, float error) {
+float squared_in_plan(Extent extent) {
+    vec2 d = max(max(extent.low, -extent.high), 0.0).xz;
+    precise vec2 squares = d * d;
+    precise float level_squared = squares.x + squares.y;
+    precise float squared = level_squared + view.above_squared;
+    return squared;
+}
+
+float ratio(uint level, Extent extent, float error) {
+    if (view.metric == DISTANCE) {
+        precise float over = ways[level] * squared_in_plan(extent);
+        return over;
+    }
     return allowed_over(view.scale, extent, error);
 }
 

@@ -3,6 +3,7 @@
 const uint ONE = 64;
 const uint FINER = 128;
 const uint STITCHED = 128;
+const uint BY_DISTANCE = 96;
 
 // Whether a node is split, and how far the blocks in it have gone over into it: refine.rs, weight.
 bool weight(Node node, out uint found) {

@@ -15,3 +15,5 @@ layout(constant_id = 2) const uint PAGE_SHIFT = 0;
 layout(constant_id = 7) const bool MORPH = false;
 // Lattice meshes have skirts.
 layout(constant_id = 8) const bool SKIRTS = false;
+// They do so by their own distance.
+layout(constant_id = 10) const bool DISTANCE = false;

@@ -81,23 +81,31 @@ int step_at(Instance instance, ivec2 turned) {
     return 1 << (vertex_level(instance, turned) - instance.shift);
 }
 
-ivec2 stitched_position(Instance instance, ivec2 turned) {
-    ivec2 slot = slot(instance, turned);
-    if (!is_stitched(instance, slot)) return turned;
+ivec2 even_position(Instance instance, ivec2 turned) {
     int unit = step_at(instance, turned);
-    return slot.y < 2 ? ivec2(turned.x, turned.y - (turned.y & unit)) : ivec2(turned.x - (turned.x & unit), turned.y);
+    bool upright = slot(instance, turned).y < 2;
+    return upright ? ivec2(turned.x, turned.y - (turned.y & unit)) : ivec2(turned.x - (turned.x & unit), turned.y);
+}
+
+ivec2 stitched_position(Instance instance, ivec2 turned) {
+    return is_stitched(instance, slot(instance, turned)) ? even_position(instance, turned) : turned;
 }
 
 ivec2 lattice_position(Instance instance, ivec2 turned) {
     return min(instance.origin + scaled(instance, turned), frame.last);
 }
 
-vec3 relative_position(ivec2 at, float height) {
+vec2 relative_plan(ivec2 at) {
     precise vec2 plan = vec2(at - frame.anchor) * frame.spacing;
     precise vec2 moved = plan + frame.anchor_relative;
+    return moved;
+}
+
+vec3 relative_position(ivec2 at, float height) {
+    vec2 plan = relative_plan(at);
     precise float above = height - frame.anchor_height;
     precise float y = above + frame.anchor_height_relative;
-    return vec3(moved.x, y, moved.y);
+    return vec3(plan.x, y, plan.y);
 }
 
 float morphed_height(float finer, float coarser, float weight) {
@@ -226,11 +234,45 @@ Placed hung_vertex(Instance instance, ivec2 turned) {
     return Placed(lattice_position(instance, hung.at), height, uint(level) | (hung.side < 0 ? 0 : SKIRT));
 }
 
+// Weights by distance: src/draw/distance.rs.
+const float END = 1.5;
+
+uint distance_weight(Instance instance, ivec2 at, int level) {
+    vec2 plan = relative_plan(at);
+    precise vec2 squares = plan * plan;
+    precise float level_squared = squares.x + squares.y;
+    precise float squared = level_squared + uintBitsToFloat(instance.weights.w);
+    precise float ratio = squared * uintBitsToFloat(level == int(instance.level) ? instance.weights.y : instance.weights.z);
+    if (ratio >= END) return ONE;
+    precise float part = ratio - 1.0;
+    precise float scaled = part * (2.0 * float(ONE));
+    return uint(clamp(scaled, 0.0, float(ONE - 1)));
+}
+
+bool is_beside_another(Instance instance, ivec2 turned) {
+    ivec2 slot = slot(instance, turned);
+    if (slot.x == 0) return false;
+    if (slot.x == 3) return vertex_level(instance, turned) < int(instance.level);
+    return ((instance.weights.x >> (2 * (slot.x - 1) + slot.y / 2)) & 1) == 0;
+}
+
+Placed distant_vertex(Instance instance, ivec2 turned) {
+    int level = vertex_level(instance, turned);
+    uint weight = distance_weight(instance, lattice_position(instance, turned), level);
+    if (weight == ONE && is_beside_another(instance, turned)) turned = even_position(instance, turned);
+    ivec2 apart = half_edge(instance, turned, level);
+    ivec2 last = instance.origin + max(scaled(instance, turned - apart), scaled(instance, turned + apart));
+    if (any(greaterThan(last, frame.last))) weight = 0;
+    float height = quadrant_height(instance, turned, level, weight);
+    return Placed(lattice_position(instance, turned), height, uint(level));
+}
+
 // Where an instance draws a vertex of its mesh.
 Placed placed(Instance instance, ivec2 position) {
     ivec2 turned = turned_position(instance, position);
     if (is_skirted(instance)) return hung_vertex(instance, turned);
     if (!MORPH) return Placed(lattice_position(instance, turned), sampled_height(instance, turned), instance.level);
+    if (DISTANCE) return distant_vertex(instance, turned);
     turned = stitched_position(instance, turned);
     float height = lattice_height(instance, turned);
     return Placed(lattice_position(instance, turned), height, uint(vertex_level(instance, turned)));

@@ -3,8 +3,8 @@
 
 use glam::DVec3;
 
-use crate::draw::Seams;
 use crate::draw::layout::Frame;
+use crate::draw::{Morph, Seams};
 use crate::height::{Field, Samples};
 use crate::texture::detail;
 use crate::view::{Lens, View};
@@ -81,8 +81,8 @@ pub struct ScenePlan {
     pub page_shift: u32,
     /// Normals filter heights with the device's sampler.
     pub filtered: bool,
-    /// Lattice vertices have weights: they go over to the next coarser level, or fall onto coarser sides.
-    pub morph: bool,
+    /// How lattice vertices move: to the next coarser level, or onto coarser sides.
+    pub morph: Morph,
     /// Lattice meshes have skirts.
     pub skirts: bool,
     /// The ground's materials are there, and looked up.
@@ -118,7 +118,7 @@ impl ScenePlan {
             wireframe: look.wireframe,
             page_shift,
             filtered: device.filters_heights && page_shift == 0,
-            morph: false,
+            morph: Morph::No,
             skirts: false,
             detail: look.detail,
             measured: true,
@@ -137,8 +137,8 @@ impl ScenePlan {
         Ok(plan)
     }
 
-    /// The plan for a technique that morphs, or does not.
-    pub fn with_morph(self, morph: bool) -> Self {
+    /// The plan for a technique whose lattice vertices move like this.
+    pub fn with_morph(self, morph: Morph) -> Self {
         Self { morph, ..self }
     }
 
@@ -188,7 +188,7 @@ impl ScenePlan {
             sort(self.page_shift > 0, "height pages", "the field exceeds one image", "one image holds the field", 0),
             sort(!self.filtered, "filtering in the shader", "the device cannot", "the device's sampler does it", 0),
             sort(
-                self.morph,
+                self.morph != Morph::No,
                 "vertex weights",
                 "lattice vertices morph or fall onto coarser sides",
                 "no lattice vertex moves",

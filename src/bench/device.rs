@@ -42,7 +42,7 @@ impl DeviceLaboratory {
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_morph(technique.morphs()).with_seams(technique.seams()))
+        Ok(plan.with_morph(technique.morph()).with_seams(technique.seams()))
     }
 
     /// A technique as it is when just made, and its stage.
@@ -128,7 +128,7 @@ impl Laboratory for DeviceLaboratory {
     fn measure(&mut self, scene: &Scene) -> Result<Errors> {
         let (mut technique, mut stage) = self.set(scene)?;
         let mut pool = Pool::default();
-        let mut before: Option<(Geometry, DrawList)> = None;
+        let mut before: Option<(View, Geometry, DrawList)> = None;
         for (frame, view) in scene.views.iter().enumerate() {
             let is_measured = frame % scene.case.every == 0;
             let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
@@ -139,15 +139,16 @@ impl Laboratory for DeviceLaboratory {
                 let truth = self.truth(scene, frame)?;
                 let fragments = times.gpu.statistics.map(|[.., fragments]| fragments);
                 look(scene, frame, technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
-                if let Some((resident, list)) = &before {
-                    let old = pop::State { resident, list };
-                    let new = pop::State { resident: technique.resident(), list: &stage.list };
-                    pool.pop(&pop::pop(scene.field, view, old, new));
+                if let Some((view, resident, list)) = &before {
+                    let old = pop::State { view, resident, list };
+                    let new =
+                        pop::State { view: &scene.views[frame], resident: technique.resident(), list: &stage.list };
+                    pool.pop(&pop::pop(scene.field, old, new));
                 }
             }
             // What the next frame is held against, if it is measured.
             let is_wanted = (frame + 1) % scene.case.every == 0;
-            before = is_wanted.then(|| (technique.resident().clone(), stage.list.clone()));
+            before = is_wanted.then(|| (*view, technique.resident().clone(), stage.list.clone()));
         }
         pool.finish(scene)
     }

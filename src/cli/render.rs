@@ -137,7 +137,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_morph(technique.morphs()).with_seams(technique.seams());
+    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;

@@ -185,7 +185,8 @@ shared! {
         lower_plane: vec4,
         /// Unit vector that the eye looks along.
         forward: vec3,
-        /// 0: certified, through a pinhole; 1: the paper's, through a pinhole; 2: the same error everywhere.
+        /// 0: certified, through a pinhole; 1: the paper's, through a pinhole; 2: the same error everywhere; 3: by
+        /// distance alone, from the one where each level's way begins.
         metric: uint,
         /// Near plane, metres.
         near: float,
@@ -205,6 +206,8 @@ shared! {
         culls: uint,
         /// As `scale`, over the pixels that skirts hang down further than the gap.
         skirt_scale: float,
+        /// Square of the eye's distance from all land in height, m²: with metric 3.
+        above_squared: float,
     }
 
     /// What does not change of the quadtree of clusters. Offsets count words after this struct.

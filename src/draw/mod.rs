@@ -1,5 +1,6 @@
 //! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
 
+pub mod distance;
 pub mod driver;
 pub mod expand;
 pub mod layout;
@@ -65,6 +66,18 @@ pub enum Upload {
     Vertices(u32, Vec<ExplicitVertex>),
     /// Overwrites resident indices from the given one on.
     Indices(u32, Vec<u32>),
+}
+
+/// How the lattice vertices of a technique's lists move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Morph {
+    /// They do not.
+    #[default]
+    No,
+    /// To the next coarser level, or onto coarser sides, as their instance's [`weights`] say.
+    ByInstance,
+    /// The same, each as its own [`distance`] says.
+    ByDistance,
 }
 
 /// How meshes of a technique's lists meet.

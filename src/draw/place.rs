@@ -1,5 +1,6 @@
 //! Where lattice vertices lie: the CPU twin of `shaders/position.glsl`, function by function.
 
+use super::distance::{self, is_by_distance};
 use super::layout::{ExplicitVertex, Frame, Instance};
 use super::skirts::{self, SKIRT, is_skirted};
 use super::weights::region_weight;
@@ -75,6 +76,9 @@ pub fn placed(field: &Field, frame: &Frame, instance: &Instance, position: [i32;
     if is_skirted(instance) {
         return hung_vertex(field, frame, instance, turned);
     }
+    if is_by_distance(instance) {
+        return distant_vertex(field, frame, instance, turned);
+    }
     let turned = stitched_position(instance, turned);
     Placed {
         at: lattice_position(frame, instance, turned),
@@ -107,6 +111,24 @@ fn quadrant_height(field: &Field, frame: &Frame, instance: &Instance, at: [i32; 
     morphed_height(sampled(at), midpoint(end(-1), end(1)), unit_weight(weight))
 }
 
+/// A turned vertex that goes over to the next coarser level by its own distance. One whose edge of that level ends
+/// beyond the field stays.
+fn distant_vertex(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> Placed {
+    let level = vertex_level(instance, turned);
+    let weight = distance::weight(frame, instance, lattice_position(frame, instance, turned), level);
+    let is_stitched = weight == ONE && distance::is_beside_another(instance, turned);
+    let turned = if is_stitched { even_position(instance, turned) } else { turned };
+    let apart = half_edge(instance, turned, level);
+    let ends = [-1, 1].map(|sign| [0, 1].map(|k| turned[k] + sign * apart[k]));
+    let is_inside = |end: &[i32; 2]| (0..2).all(|k| instance.origin[k] + scaled(instance, end[k]) <= frame.last[k]);
+    let weight = if ends.iter().all(is_inside) { weight } else { 0 };
+    Placed {
+        at: lattice_position(frame, instance, turned),
+        height: quadrant_height(field, frame, instance, turned, level, weight),
+        level: level as u32,
+    }
+}
+
 /// A mesh vertex turned as its instance says, in mesh units.
 pub fn turned_position(instance: &Instance, [x, z]: [i32; 2]) -> [i32; 2] {
     let cells = instance.cells as i32;
@@ -131,13 +153,14 @@ fn step_at(instance: &Instance, turned: [i32; 2]) -> i32 {
 /// Where a turned mesh vertex comes to lie in its mesh: on a line that meets a coarser mesh, an odd vertex falls
 /// onto the even one before it.
 pub fn stitched_position(instance: &Instance, turned: [i32; 2]) -> [i32; 2] {
-    let slot = slot(instance, turned);
-    if !is_stitched(instance, slot) {
-        return turned;
-    }
+    if is_stitched(instance, slot(instance, turned)) { even_position(instance, turned) } else { turned }
+}
+
+/// The even vertex before one on a side or seam, or itself.
+fn even_position(instance: &Instance, turned: [i32; 2]) -> [i32; 2] {
     let step = step_at(instance, turned);
     let [x, z] = turned;
-    if slot.1 < 2 { [x, z - (z & step)] } else { [x - (x & step), z] }
+    if slot(instance, turned).1 < 2 { [x, z - (z & step)] } else { [x - (x & step), z] }
 }
 
 /// Lattice position of a turned mesh vertex: scaled, moved, and held inside the field, so that the part of a
@@ -233,12 +256,14 @@ pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
 }
 
 /// Position relative to the eye in metres, world axes, of a lattice position and height.
-pub fn relative_position(frame: &Frame, [x, z]: [i32; 2], height: f32) -> [f32; 3] {
-    [
-        (x - frame.anchor[0]) as f32 * frame.spacing[0] + frame.anchor_relative[0],
-        (height - frame.anchor_height) + frame.anchor_height_relative,
-        (z - frame.anchor[1]) as f32 * frame.spacing[1] + frame.anchor_relative[1],
-    ]
+pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
+    let [x, z] = relative_plan(frame, at);
+    [x, (height - frame.anchor_height) + frame.anchor_height_relative, z]
+}
+
+/// The same in plan (x, z).
+pub fn relative_plan(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
+    [0, 1].map(|k| (at[k] - frame.anchor[k]) as f32 * frame.spacing[k] + frame.anchor_relative[k])
 }
 
 /// Height between two shapes: `weight` 0 is the finer one, 1 the coarser one, both to the bit.

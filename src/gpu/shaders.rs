@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
+use crate::draw::Morph;
 use crate::plan::ScenePlan;
 
 /// File name of the source and SPIR-V of every shader (made by build.rs).
@@ -55,9 +56,10 @@ impl Constants {
             flag(plan.fog),
             plan.colour as u32,
             flag(plan.filtered),
-            flag(plan.morph),
+            flag(plan.morph != Morph::No),
             flag(plan.skirts),
             flag(plan.detail),
+            flag(plan.morph == Morph::ByDistance),
         ])
     }
 

@@ -16,7 +16,7 @@ use super::surface;
 
 /// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
 /// the two steps of `draw::place::lattice_height`.
-const ROUNDING: f32 = 8.0 * f32::EPSILON;
+pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// Fields with fewer stored samples are measured in a moment: nothing is kept.
 const KEPT_FROM: u64 = 1 << 23;
@@ -294,7 +294,7 @@ impl Level {
 }
 
 /// Whether the squares of a level lie on a tiled axis of this period so that each looks like one of the first.
-fn is_aligned(period: u32, level: u32, side: u32) -> bool {
+pub fn is_aligned(period: u32, level: u32, side: u32) -> bool {
     period.is_multiple_of(side) || side.is_multiple_of(period) && period.is_multiple_of(4 << level)
 }
 

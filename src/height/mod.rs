@@ -11,6 +11,7 @@ mod georef;
 mod geotiff;
 mod hgt;
 mod kept;
+pub mod level_errors;
 pub mod levels;
 mod load;
 mod png;

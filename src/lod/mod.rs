@@ -11,7 +11,7 @@ pub mod sorted_strips;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Seams, Submission};
+use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Morph, Seams, Submission};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -61,10 +61,9 @@ pub trait Technique: Send {
         true
     }
 
-    /// Whether its instances have weights ([`weights`](crate::draw::weights)): its lattice vertices morph, or fall
-    /// onto coarser sides.
-    fn morphs(&self) -> bool {
-        false
+    /// How its lattice vertices move.
+    fn morph(&self) -> Morph {
+        Morph::No
     }
 
     /// How its meshes meet: which of the two proofs its lists pass ([`watertight`](crate::measure::watertight)).

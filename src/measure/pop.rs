@@ -1,10 +1,10 @@
 //! The pop meter: how far the surface jumps on the screen from one frame to the next by the change of its level
 //! of detail alone.
 //!
-//! The list of frame t − 1 and that of frame t are both laid over the lattice in the view of frame t: an expanded
-//! list knows nothing of the eye but through its own instances, in which morph weights stand as they were. Every
-//! sample with data that both cover, and whose point on the newer surface is in view, is measured once: the way
-//! between its two points on the screen, both projected in f64 as in [`geometric`](super::geometric).
+//! The list of frame t − 1 and that of frame t are both laid over the lattice, each as its own eye had it, morph weights
+//! included, and both are seen in the view of frame t. Every sample with data that both cover, and whose point on the
+//! newer surface is in view, is measured once: the way between its two points on the screen, both projected in f64 as
+//! in [`geometric`](super::geometric).
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -28,6 +28,8 @@ const BINS: [i32; 2] = [-6, 6];
 /// then a copy from before goes with the list from before.
 #[derive(Clone, Copy, Debug)]
 pub struct State<'a> {
+    /// The view that the list was made for.
+    pub view: &'a View,
     /// The technique's resident geometry at that frame.
     pub resident: &'a Geometry,
     /// The draw list of that frame.
@@ -56,8 +58,8 @@ pub struct Pop {
 
 /// Measures the jump from the level of detail of frame t − 1 to that of frame t in the view of frame t. Takes
 /// eight bytes a sample of the field while it runs.
-pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
-    let meter = Meter { field, projection: Projection::new(view), frame: Frame::placing(field, view) };
+pub fn pop(field: &Field, before: State, after: State) -> Pop {
+    let meter = Meter { field, projection: Projection::new(after.view) };
     let heights = meter.heights(before);
     let (mut tally, mut histogram) = meter.empty();
     let work = |part: &Draw| meter.part(&heights, after, part);
@@ -78,7 +80,6 @@ pub fn pop(field: &Field, view: &View, before: State, after: State) -> Pop {
 struct Meter<'a> {
     field: &'a Field,
     projection: Projection,
-    frame: Frame,
 }
 
 impl Meter<'_> {
@@ -94,7 +95,8 @@ impl Meter<'_> {
     /// Calls `visit` for every sample of a part that the part's triangles count, with the drawn height.
     fn samples(&self, state: State, part: &Draw, mut visit: impl FnMut(u32, u32, f64)) {
         let last = self.field.size().map(|n| n as i32 - 1);
-        expand::visit_draw(self.field, &self.frame, state.resident, state.list, part, &mut |drawn| {
+        let frame = Frame::placing(self.field, state.view);
+        expand::visit_draw(self.field, &frame, state.resident, state.list, part, &mut |drawn| {
             let triangle = facing_up(&drawn.corners);
             surface::visit_samples(&triangle, |x, z, y| {
                 if owns(&triangle, [x as i32, z as i32], last) && !self.field.is_hole(x, z) {
@@ -179,8 +181,9 @@ mod tests {
 
     fn jump(before: &DrawList, after: &DrawList) -> Pop {
         let resident = Geometry::default();
-        let state = |list| State { resident: &resident, list };
-        pop(&field(), &view(), state(before), state(after))
+        let view = view();
+        let state = |list| State { view: &view, resident: &resident, list };
+        pop(&field(), state(before), state(after))
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Fields, forms of techniques and views that the laws are tried on.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
 use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::{Entry, Setting, Settings, Values, Variant};
+use cuesta::lod::{Entry, Setting, Settings, TECHNIQUES, Values};
 use cuesta::view::{Containment, Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
@@ -15,12 +16,19 @@ pub struct Form {
     pub settings: Settings,
 }
 
-/// Every combination of an entry's settings that says something, and each variant with the default ones and with each single one: a
-/// variant changes how a list is submitted.
+/// Forms in which every value of an entry's settings meets every one of every other setting, and every variant.
 pub fn forms(entry: &'static Entry) -> Vec<Form> {
-    let mut choices: Vec<Vec<(String, String)>> = vec![Vec::new()];
+    pairwise(combinations(entry)).iter().map(|choice| form(entry, choice)).collect()
+}
+
+/// A variant, or none, as the value of no key, and a value for each setting.
+type Choice = Vec<(String, String)>;
+
+fn combinations(entry: &Entry) -> Vec<Choice> {
+    let variants = std::iter::once("").chain(entry.variants.iter().map(|variant| variant.name));
+    let mut choices: Vec<_> = variants.map(|name| vec![(String::new(), name.to_string())]).collect();
     for setting in entry.settings {
-        let with = |chosen: &Vec<(String, String)>| {
+        let with = |chosen: &Choice| {
             let chosen = chosen.clone();
             values(setting)
                 .into_iter()
@@ -28,21 +36,25 @@ pub fn forms(entry: &'static Entry) -> Vec<Form> {
         };
         choices = choices.iter().flat_map(with).collect();
     }
-    let whole = choices.iter().filter(|choice| !is_idle(entry, choice)).map(|choice| form(entry, None, choice));
-    let single = entry
-        .settings
-        .iter()
-        .flat_map(|setting| values(setting).into_iter().map(|value| vec![(setting.key.to_string(), value)]));
-    let single: Vec<_> = std::iter::once(Vec::new()).chain(single).collect();
-    let of_variant = |variant: &'static Variant| single.iter().map(|choice| form(entry, Some(variant.name), choice));
-    whole.chain(entry.variants.iter().flat_map(of_variant)).collect()
+    choices
 }
 
-/// Whether a choice sets a clock that drives nothing: the same as with the default one.
-fn is_idle(entry: &Entry, choice: &[(String, String)]) -> bool {
-    let chosen = |key: &str| choice.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str());
-    let default = entry.settings.iter().find(|setting| setting.key == "clock").map(|setting| setting.default);
-    chosen("morph") == Some("off") && chosen("clock") != default
+/// Of all choices few in which every two values occur together that do in any: each time the one with most new pairs.
+fn pairwise(mut choices: Vec<Choice>) -> Vec<Choice> {
+    let pairs = |choice: &Choice| -> Vec<_> {
+        let upto = |k: usize| choice[..=k].iter().map(move |earlier| (earlier.clone(), choice[k].clone()));
+        (0..choice.len()).flat_map(upto).collect()
+    };
+    let (mut seen, mut few) = (HashSet::new(), Vec::new());
+    loop {
+        let news = |choice: &Choice| pairs(choice).iter().filter(|pair| !seen.contains(*pair)).count();
+        let Some(best) = (0..choices.len()).rev().max_by_key(|&k| news(&choices[k])) else { return few };
+        if !few.is_empty() && news(&choices[best]) == 0 {
+            return few;
+        }
+        seen.extend(pairs(&choices[best]));
+        few.push(choices.swap_remove(best));
+    }
 }
 
 /// The values that a setting is tried at: every word, and for a number one far below its default, since a length
@@ -57,8 +69,10 @@ fn values(setting: &Setting) -> Vec<String> {
     }
 }
 
-fn form(entry: &'static Entry, variant: Option<&str>, choices: &[(String, String)]) -> Form {
+fn form(entry: &'static Entry, choice: &Choice) -> Form {
+    let ((_, variant), choices) = choice.split_first().expect("a variant or none");
     let set: Vec<_> = choices.iter().map(|(key, value)| format!("{key}={value}")).collect();
+    let variant = (!variant.is_empty()).then_some(variant.as_str());
     let name = format!("{}{} {}", entry.name, variant.map(|v| format!(":{v}")).unwrap_or_default(), set.join(" "));
     Form { name, entry, settings: Settings::new(entry, variant, choices).expect("the table's own values") }
 }
@@ -218,5 +232,25 @@ fn every_field_is_once_seen_whole_and_once_in_part() {
     for (name, field) in fields() {
         let whole = views(&field).iter().filter(|(_, view)| sees_everything(&field, view)).count();
         assert!((1..8).contains(&whole), "{name}: seen whole in {whole} views");
+    }
+}
+
+#[test]
+fn every_two_values_of_settings_meet() {
+    for entry in TECHNIQUES {
+        let forms = forms(entry);
+        let whole = combinations(entry).len();
+        for (k, one) in entry.settings.iter().enumerate() {
+            for other in &entry.settings[..k] {
+                for (a, b) in
+                    values(one).into_iter().flat_map(|a| values(other).into_iter().map(move |b| (a.clone(), b)))
+                {
+                    let pair = [format!("{}={a}", one.key), format!("{}={b}", other.key)];
+                    let meet = |form: &Form| pair.iter().all(|part| form.name.split(' ').any(|word| word == part));
+                    assert!(forms.iter().any(meet), "{}: {pair:?}", entry.name);
+                }
+            }
+        }
+        println!("{}: {} forms of {whole} combinations", entry.name, forms.len());
     }
 }

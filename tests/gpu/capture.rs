@@ -21,7 +21,7 @@ fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits())
         .unwrap()
-        .with_morph(technique.morphs())
+        .with_morph(technique.morph())
         .with_seams(technique.seams());
     let mut stage = Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, view.size).unwrap();
     stage.draw(technique, view, Copy::PictureAndDepth).unwrap();
@@ -67,6 +67,10 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters:gpu-driven", &["block=8", "morph=on"]),
                 ("smooth-tiles", &["tile=17"]),
                 ("smooth-tiles", &["tile=9", "morph=off"]),
+                ("clusters:gpu-driven", &["block=8", "seams=skirts", "morph=on"]),
+                ("clusters", &["block=8", "morph=distance"]),
+                ("clusters:draw-per-block", &["block=8", "morph=distance"]),
+                ("clusters:gpu-driven", &["block=8", "morph=distance"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());

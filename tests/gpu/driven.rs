@@ -34,7 +34,7 @@ fn set(list: &DrawList) -> Set {
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_morph(technique.morphs()).with_seams(technique.seams());
+    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
 }
 
@@ -128,6 +128,7 @@ fn on_every_frame_of_a_path_device_and_host_select_alike() {
                     ["block=16", "morph=off", "seams=stitched"],
                     ["block=8", "morph=on", "seams=stitched"],
                     ["block=8", "morph=on", "seams=skirts"],
+                    ["block=8", "morph=distance", "seams=stitched"],
                 ];
                 for settings in ways {
                     let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
@@ -159,17 +160,21 @@ fn from_anywhere_on_any_field_device_and_host_select_alike() {
         for (name, field) in fields {
             let views: Vec<_> = (0..8).map(|_| anywhere(&field, &mut seed)).collect();
             for block in ["block=8", "block=16", "block=32", "block=64", "block=128"] {
-                let ways: [(&str, &str); 6] = [
+                let ways: [(&str, &str); 7] = [
                     ("seams=stitched", "morph=off"),
                     ("seams=stitched", "morph=on"),
                     ("seams=stitched", "error=halved"),
+                    ("seams=stitched", "morph=distance"),
                     ("seams=skirts", "morph=off"),
                     ("seams=skirts", "morph=on"),
                     ("seams=skirts", "error=halved"),
                 ];
-                for (seams, setting) in ways {
+                let is_tried = |seams: &str, setting: &str| {
+                    ["block=8", "block=32"].contains(&block) || (seams, setting) == ("seams=stitched", "morph=off")
+                };
+                for (seams, setting) in ways.into_iter().filter(|(seams, setting)| is_tried(seams, setting)) {
                     // A morph all around a field without end is more than any list holds.
-                    if name.starts_with("500") && setting == "morph=on" {
+                    if name.starts_with("500") && ["morph=on", "morph=distance"].contains(&setting) {
                         continue;
                     }
                     let instances = compare(gpu, &field, &[block, seams, setting], &views);

@@ -66,7 +66,7 @@ fn shoot_planned(
 fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Shot {
     let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
         .unwrap()
-        .with_morph(technique.morphs())
+        .with_morph(technique.morph())
         .with_seams(technique.seams());
     shoot_planned(gpu, field, &plan, technique, view)
 }

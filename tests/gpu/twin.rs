@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cuesta::draw::layout::{ExplicitVertex, Frame};
 use cuesta::draw::place::{explicit_height, lattice_position, placed, relative_position, turned_position};
 use cuesta::draw::skirts::{self, is_skirted};
-use cuesta::draw::{DrawList, Instance, Seams};
+use cuesta::draw::{DrawList, Instance, Morph, Seams};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
 use cuesta::height::Field;
@@ -14,13 +14,13 @@ use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with made-up weights if they are to morph.
-fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], morph: bool) -> Vec<Query> {
+/// Every vertex of every third instance that a technique draws, with its weights or made-up ones.
+fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
-    let queries = (1u8..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+    let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
         // Any bytes are weights; quadrants of level 0 cannot be finer than it.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
@@ -32,7 +32,7 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
         let morphing = Instance { weights, ..*instance };
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
-            instance: if morph { morphing } else { *instance },
+            instance: if is_made_up { morphing } else { *instance },
             explicit_height: 0,
         })
     });
@@ -40,13 +40,22 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
 }
 
 /// Lattice vertices of two techniques, and explicit vertices with weights of their own.
-fn queries(field: &Arc<Field>, view: &View, morph: bool) -> Vec<Query> {
-    let mut queries = lattice_queries(field, view, "geomipmap", &["block=17"], morph);
-    // Without weights the program does not know of half samples.
-    if morph {
-        queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on"], morph));
-        queries.extend(lattice_queries(field, view, "clusters", &["block=8", "morph=on", "seams=skirts"], morph));
-    }
+fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
+    let forms: &[(&str, &[&str])] = match morph {
+        // Without weights the program does not know of half samples.
+        Morph::No => &[("geomipmap", &["block=17"])],
+        Morph::ByInstance => &[
+            ("geomipmap", &["block=17"]),
+            ("clusters", &["block=8", "morph=on"]),
+            ("clusters", &["block=8", "morph=on", "seams=skirts"]),
+        ],
+        Morph::ByDistance => {
+            &[("clusters", &["block=8", "morph=distance"]), ("clusters:draw-per-block", &["block=8", "morph=distance"])]
+        }
+    };
+    let is_made_up = morph == Morph::ByInstance;
+    let of_form = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, is_made_up);
+    let mut queries: Vec<_> = forms.iter().flat_map(of_form).collect();
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
             position: [(k % 37) as i32, (k / 37) as i32],
@@ -83,12 +92,12 @@ fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
 }
 
 fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
-    for morph in [false, true] {
+    for morph in [Morph::No, Morph::ByInstance, Morph::ByDistance] {
         compare_morph(gpu, name, field, page_shift, morph);
     }
 }
 
-fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: bool) {
+fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph) {
     let view = aslant(field, [320, 200], 2.0);
     let frame = Frame::placing(field, &view);
     let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())

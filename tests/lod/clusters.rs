@@ -83,7 +83,7 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
     for k in 0..60 {
         let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129], [17, 17]][k % 5]);
         let seams = if k < 50 { "seams=stitched" } else { "seams=skirts" };
-        let settings = ["block=8", ["morph=off", "morph=on"][k / 2 % 2], seams];
+        let settings = ["block=8", ["morph=off", "morph=on", "morph=distance"][k / 2 % 3], seams];
         let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
             .map(|m| technique(&field, m, &settings));
         for _ in 0..20 {
@@ -122,7 +122,7 @@ fn every_frame_of_skim_and_circle_is_drawn_alike_in_every_mode() {
     let mut field = synth(Kind::Eroded, [513, 513], 7);
     field.spacing = [25.0; 2];
     let field = Arc::new(field);
-    for morph in ["morph=off", "morph=on"] {
+    for morph in ["morph=off", "morph=on", "morph=distance"] {
         let modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"];
         let mut modes = modes.map(|mode| technique(&field, mode, &[morph, "block=16"]));
         for path in ["skim", "circle"].map(|name| paths::find(name).expect("a named path")) {

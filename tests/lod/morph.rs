@@ -125,6 +125,11 @@ fn clusters_do_not_jump_either() {
         println!("clusters, {block} {seams}: {off:.3} px at once, {on:.3} px morphing");
         assert!(on < JUMP_PX && JUMP_PX < off, "{block} {seams}: {on} px morphing, {off} px at once");
     }
+    for block in ["block=8", "block=16"] {
+        let on = largest_jump(&field, "clusters", &[block, "morph=distance"]);
+        println!("clusters, {block} by distance: {on:.3} px morphing");
+        assert!(on < JUMP_PX, "{block}: {on} px morphing by distance");
+    }
 }
 
 #[test]

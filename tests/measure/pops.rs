@@ -50,9 +50,9 @@ fn journey(settings: &[(&str, &str)]) -> Vec<(Pop, f64)> {
     let mut technique = technique(&field, "geomipmap", settings);
     let lists: Vec<_> = (0..40).map(|k| select(&mut *technique, &view(&field, k))).collect();
     let pair = |k: usize| {
-        let (view, resident) = (view(&field, k as u32), technique.resident());
-        let [before, after] = [&lists[k - 1], &lists[k]].map(|list| State { resident, list });
-        let found = pop::pop(&field, &view, before, after);
+        let ([old_view, view], resident) = ([k - 1, k].map(|k| view(&field, k as u32)), technique.resident());
+        let before = State { view: &old_view, resident, list: &lists[k - 1] };
+        let found = pop::pop(&field, before, State { view: &view, resident, list: &lists[k] });
         let [old, new] = [&lists[k - 1], &lists[k]].map(|list| heights(&drawn(&field, &view, &*technique, list)));
         let moved = old.iter().filter_map(|(&[x, z], &from)| {
             let [from, to] = [from, *new.get(&[x, z])?].map(|y| field.world_at(x.into(), z.into(), y));

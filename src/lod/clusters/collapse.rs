@@ -73,7 +73,11 @@ impl Collapse<'_> {
         let instance = match &self.skirts {
             Some(skirts) => Instance { turns, ..self.skirted(skirts, node, level, blocks(node, state)) },
             None => {
-                let weights = self.weights(split, state);
+                let weights = if self.sight.is_by_distance() {
+                    self.sight.ways.weights(level, 0, finer(state))
+                } else {
+                    self.weights(split, state)
+                };
                 Instance { turns, cells: 4 * self.cells, weights, ..self.placed(node, level) }
             }
         };
@@ -84,7 +88,11 @@ impl Collapse<'_> {
     fn lone_block(&self, root: Node) -> Instance {
         match &self.skirts {
             Some(skirts) => self.skirted(skirts, root, root.level, std::iter::once((0, root))),
-            None => Instance { cells: 2 * self.cells, ..self.placed(root, root.level) },
+            None => {
+                let is_by_distance = self.sight.is_by_distance();
+                let weights = if is_by_distance { self.sight.ways.weights(root.level, 0, 0) } else { [0; 4] };
+                Instance { cells: 2 * self.cells, weights, ..self.placed(root, root.level) }
+            }
         }
     }
 
@@ -93,12 +101,17 @@ impl Collapse<'_> {
         if let Some(skirts) = &self.skirts {
             return self.skirted(skirts, node, node.level, std::iter::once((0, node)));
         }
+        let is_sibling = |side: usize| node.beyond(side).is_some_and(|beyond| beyond.parent() == split.node);
         let inside = split.weight(self.sight);
         let side = |side: usize| {
-            let sibling = node.beyond(side).is_some_and(|beyond| beyond.parent() == split.node);
-            if sibling { inside } else { self.refinement.side_weight(self.sight, split, side) }
+            if is_sibling(side) { inside } else { self.refinement.side_weight(self.sight, split, side) }
         };
-        let weights = weights::uniform(inside, SIDES.map(side));
+        let weights = if self.sight.is_by_distance() {
+            let staying = SIDES.map(|side| u32::from(is_sibling(side)) << side).iter().sum();
+            self.sight.ways.weights(node.level, staying, 0)
+        } else {
+            weights::uniform(inside, SIDES.map(side))
+        };
         Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
     }
 
@@ -164,6 +177,11 @@ fn blocks(node: Node, state: State) -> impl Iterator<Item = (u32, Node)> {
         let count = [0, 1, 4][usize::from(what)];
         (0..count).map(move |k| (quadrant, if what == BLOCK { child } else { child.child(k) }))
     })
+}
+
+/// The quadrants of a state whose blocks are one level finer, a bit each.
+fn finer(state: State) -> u32 {
+    (0..4).map(|quadrant| u32::from(state[quadrant] == FOUR_BLOCKS) << quadrant).sum()
 }
 
 /// The halves of outer sides that a quadrant has: slot and side.

@@ -11,6 +11,7 @@
 use super::mesh::Mesh;
 use super::states::Seeds;
 use super::tree::{Errors, Tree};
+use super::ways::WAYS;
 use crate::draw::Seams;
 use crate::draw::driver::{Driver, Groups, Step};
 use crate::draw::layout::{ClusterScratch, ClusterTree, ClusterView};
@@ -65,10 +66,10 @@ pub fn driver(tree: &Tree, cells: u32, seams: Seams, seeds: &Seeds, mesh: &Mesh,
         cells,
         root,
         cuts: u32::from(tree.bounds.has_errors()),
-        skirts: match (seams, tree.errors) {
+        skirts: match (seams, &tree.errors) {
             (Seams::Shared, _) => 0,
-            (Seams::Skirts, Errors::Measured) => 1,
             (Seams::Skirts, Errors::Halved(_)) => 2,
+            (Seams::Skirts, _) => 1,
         },
         most: most as u32,
         places: places as u32,
@@ -86,7 +87,7 @@ pub fn driver(tree: &Tree, cells: u32, seams: Seams, seeds: &Seeds, mesh: &Mesh,
     let driver = Driver {
         programs: PROGRAMS,
         table,
-        parameters: size_of::<ClusterView>() / 4,
+        parameters: size_of::<ClusterView>() / 4 + WAYS,
         scratch: HEAD + room.0 as usize,
         steps: steps(&head),
         draws: mesh.ranges.len(),

@@ -17,6 +17,8 @@
 //! - with `morph=on` the blocks in a node go over into it as eq. 3 and 4 have it, with a weight for each quadrant:
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
 //!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
+//! - with `morph=distance` every vertex has a weight by its own distance, so that edges agree by themselves; for that
+//!   the error is that of a whole level ([`ways`]), and finer levels reach farther than anywhere needed;
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
 //! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
@@ -30,6 +32,7 @@ mod sight;
 mod skirts;
 pub mod states;
 mod tree;
+mod ways;
 
 use std::sync::Arc;
 
@@ -41,7 +44,7 @@ use self::skirts::Skirts;
 use self::states::{MOST_SEEDS, Seeds};
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Seams, Source, Submission, Topology};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Morph, Seams, Source, Submission, Topology};
 use crate::height::Field;
 use crate::height::bounds::Measure;
 use crate::view::View;
@@ -78,9 +81,9 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "morph",
-            values: Values::Words(&["off", "on"]),
+            values: Values::Words(&["off", "on", "distance"]),
             default: "off",
-            about: "whether blocks go over into their parent, or change at once",
+            about: "blocks change at once, go over into their parent, or each vertex by its distance (no skirts)",
         },
         Setting {
             key: "seams",
@@ -101,6 +104,17 @@ enum Mode {
     GpuDriven,
 }
 
+/// How blocks go over into their parent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Morphing {
+    /// At once.
+    Off,
+    /// Each block as its parent's error says.
+    Blocks,
+    /// Each vertex as its distance says.
+    Vertices,
+}
+
 struct Clusters {
     /// The most clusters, or blocks, that a list holds.
     most_drawn: usize,
@@ -111,8 +125,7 @@ struct Clusters {
     refinement: Refinement,
     mode: Mode,
     cells: u32,
-    morph: bool,
-    band_end: f32,
+    morph: Morphing,
     seams: Seams,
     measured: bool,
     /// Seed and instance of what is drawn.
@@ -122,8 +135,13 @@ struct Clusters {
 impl Clusters {
     fn new(field: &Arc<Field>, settings: &Settings) -> Self {
         let cells = settings.number("block") as u32;
-        let morph = settings.word("morph") == "on";
-        let seams = if settings.word("seams") == "skirts" { Seams::Skirts } else { Seams::Shared };
+        let morph = match settings.word("morph") {
+            "off" => Morphing::Off,
+            "on" => Morphing::Blocks,
+            _ => Morphing::Vertices,
+        };
+        let is_skirted = settings.word("seams") == "skirts" && morph != Morphing::Vertices;
+        let seams = if is_skirted { Seams::Skirts } else { Seams::Shared };
         let measured = settings.word("error") == "measured";
         let mode = match settings.variant() {
             Some("draw-per-block") => Mode::DrawPerBlock,
@@ -131,11 +149,10 @@ impl Clusters {
             Some("gpu-driven") => Mode::GpuDriven,
             _ => Mode::Indirect,
         };
-        let band_end = if morph { MORPH_RATIO } else { 1.0 };
         // A little more than the band is wide: no rounding puts two nodes over a place into theirs.
-        let growth = if morph { band_end * 1.001 } else { 1.0 };
-        let measure = Measure { cells, growth, errors: measured, morph };
-        let tree = Tree::new(field, measure, !measured, &settings.progress);
+        let growth = if morph == Morphing::Blocks { MORPH_RATIO * 1.001 } else { 1.0 };
+        let measure = Measure { cells, growth, errors: measured, morph: morph == Morphing::Blocks };
+        let tree = Tree::new(field, measure, morph == Morphing::Vertices, &settings.progress);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
         let mesh = Mesh::new(cells as i32, &seeds.states, seams);
         // A quadtree has at most three leaves more for each split node.
@@ -148,11 +165,7 @@ impl Clusters {
         let is_driven = mode == Mode::GpuDriven;
         let driver = is_driven.then(|| driver::driver(&tree, cells, seams, &seeds, &mesh, most_splits)).flatten();
         let (refinement, drawn) = (Refinement::new(most_splits), Vec::new());
-        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, band_end, seams, measured, drawn }
-    }
-
-    fn sight(&self, view: &View) -> Sight<'_> {
-        Sight::new(&self.tree, view, self.band_end, !self.morph)
+        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn }
     }
 
     /// Refines the quadtree, with a wider tolerance if there would be too many blocks: by what factor.
@@ -161,7 +174,7 @@ impl Clusters {
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.clear();
         loop {
-            let sight = Sight::new(&self.tree, &wider, self.band_end, !self.morph);
+            let sight = sight(&self.tree, self.morph, &wider);
             if self.refinement.refine(&sight) {
                 let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
                 let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement));
@@ -212,6 +225,14 @@ impl Clusters {
     }
 }
 
+fn sight<'a>(tree: &'a Tree, morph: Morphing, view: &View) -> Sight<'a> {
+    match morph {
+        Morphing::Off => Sight::new(tree, view, 1.0, true),
+        Morphing::Blocks => Sight::new(tree, view, MORPH_RATIO, false),
+        Morphing::Vertices => Sight::by_distance(tree, view),
+    }
+}
+
 impl Technique for Clusters {
     fn resident(&self) -> &Geometry {
         &self.mesh.geometry
@@ -236,17 +257,21 @@ impl Technique for Clusters {
     }
 
     fn parameters(&self, view: &View, words: &mut Vec<u32>) {
-        let sight = self.sight(view);
+        let sight = sight(&self.tree, self.morph, view);
         words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&sight.view)));
+        words.extend(sight.ways.ways.map(f32::to_bits));
     }
 
     fn keeps_tolerance(&self) -> bool {
         self.measured
     }
 
-    fn morphs(&self) -> bool {
-        // Without morphing too: sides that meet a coarser block fall onto its edge.
-        true
+    fn morph(&self) -> Morph {
+        match self.morph {
+            Morphing::Vertices => Morph::ByDistance,
+            // Without morphing too: sides that meet a coarser block fall onto its edge.
+            Morphing::Off | Morphing::Blocks => Morph::ByInstance,
+        }
     }
 
     fn seams(&self) -> Seams {

@@ -17,6 +17,7 @@ use glam::Vec4;
 
 use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
+use super::ways::{NODE_END, Ways};
 use crate::draw::layout::ClusterView;
 use crate::draw::place::Anchor;
 use crate::height::bounds::Square;
@@ -41,6 +42,7 @@ pub const WITHOUT_ERROR: f32 = 1e30;
 const CERTIFIED: u32 = 0;
 const PAPER: u32 = 1;
 const EVEN: u32 = 2;
+const DISTANCE: u32 = 3;
 
 /// A view of a quadtree.
 pub struct Sight<'a> {
@@ -48,6 +50,8 @@ pub struct Sight<'a> {
     pub tree: &'a Tree,
     /// The view, as the device gets it too.
     pub view: ClusterView,
+    /// What it says of levels where their distance alone counts.
+    pub ways: Ways,
 }
 
 /// Four boxes relative to the eye, metres, a lane each: x, y and z.
@@ -64,7 +68,20 @@ impl<'a> Sight<'a> {
     /// A view whose tolerance has a band from 1 to `band_end`. `culls`: nodes out of sight are left as they are; else
     /// they are not, so that no turn of the eye changes what is seen.
     pub fn new(tree: &'a Tree, view: &View, band_end: f32, culls: bool) -> Self {
-        Self { tree, view: cluster_view(tree, view, band_end, culls) }
+        Self { tree, view: cluster_view(tree, view, band_end, culls), ways: Ways::default() }
+    }
+
+    /// A view in which vertices go over to the next level by their own distance.
+    pub fn by_distance(tree: &'a Tree, view: &View) -> Self {
+        let ways = Ways::new(tree, view);
+        let known = cluster_view(tree, view, NODE_END, true);
+        let view = ClusterView { metric: DISTANCE, band_scale: 0.0, above_squared: ways.above_squared, ..known };
+        Self { tree, view, ways }
+    }
+
+    /// Whether vertices go over to the next level by their own distance.
+    pub fn is_by_distance(&self) -> bool {
+        self.view.metric == DISTANCE
     }
 
     /// Whether a node has land, in sight if that matters.
@@ -89,7 +106,8 @@ impl<'a> Sight<'a> {
     pub fn look(&self, node: Node) -> Look {
         let square = self.tree.square(node)?;
         let extent = self.extent(node, square);
-        let ratio = if node.level == 0 { WITHOUT_ERROR } else { self.ratios(&extent, Vec4::splat(square.error)).x };
+        let ratio =
+            if node.level == 0 { WITHOUT_ERROR } else { self.ratios(node.level, &extent, Vec4::splat(square.error)).x };
         Some((self.contained(&extent)[0], ratio))
     }
 
@@ -100,7 +118,10 @@ impl<'a> Sight<'a> {
         // What is in a node lies no other way than that, if it is not crossed by a plane.
         let contained = if around == Containment::Crossing { self.contained(&extents) } else { [around; 4] };
         let finest = node.level == 1;
-        let ratios = if finest { Vec4::splat(WITHOUT_ERROR) } else { self.ratios(&extents, squares.error) };
+        let ratios = match finest {
+            true => Vec4::splat(WITHOUT_ERROR),
+            false => self.ratios(node.level - 1, &extents, squares.error),
+        };
         let (has_land, ratios) = (squares.has_land(), ratios.to_array());
         let look = |k: usize| (has_land >> k & 1 == 1).then(|| (contained[k], ratios[k]));
         [look(0), look(1), look(2), look(3)]
@@ -166,9 +187,13 @@ impl<'a> Sight<'a> {
         })
     }
 
-    /// What the tolerance allows over errors: below 1 they are too coarse. Never above the exact value.
+    /// What the tolerance allows over the errors of a level: below 1 they are too coarse. Never above the exact value.
+    /// By distance: how far, squared, over where the way into the level begins.
     #[inline]
-    fn ratios(&self, extents: &Extents, errors: Vec4) -> Vec4 {
+    fn ratios(&self, level: u32, extents: &Extents, errors: Vec4) -> Vec4 {
+        if self.is_by_distance() {
+            return self.ways.ways[level as usize] * squared_in_plan(extents, self.ways.above_squared);
+        }
         self.over(self.view.scale, extents, errors)
     }
 
@@ -210,6 +235,14 @@ fn distance(extents: &Extents) -> Vec4 {
     let [x, y, z] = [away(0), away(1), away(2)];
     let square = ((x * x + y * y) + z * z).max(Vec4::splat(LEAST));
     square * inverse_roots(square)
+}
+
+/// Squares of their distances in plan, and of so much more in height: as `draw::distance::squared` at their nearest place.
+#[inline]
+fn squared_in_plan(extents: &Extents, above_squared: f32) -> Vec4 {
+    let away = |k: usize| extents.low[k].max(-extents.high[k]).max(Vec4::ZERO);
+    let [x, z] = [away(0), away(2)];
+    (x * x + z * z) + above_squared
 }
 
 /// Largest horizontal distances of boxes from the eye.
@@ -272,6 +305,7 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
         band_scale: if band_end > 1.0 { crate::draw::weights::ONE as f32 / (band_end - 1.0) } else { 0.0 },
         culls: culls.into(),
         skirt_scale: scale_for(RASTER_PX),
+        above_squared: 0.0,
     }
 }
 
@@ -365,7 +399,7 @@ mod tests {
                 let Some(square) = tree.square(node) else { continue };
                 let exact = world_box(&tree, node, square.range);
                 let error = 10f32.powf(6.0 * random(&mut seed) as f32 - 4.0);
-                let ratio = sight.ratios(&sight.extent(node, square), Vec4::splat(error)).x;
+                let ratio = sight.ratios(node.level, &sight.extent(node, square), Vec4::splat(error)).x;
                 let allowed = f64::from(ratio) * f64::from(error);
                 let share = allowed / view.allowed_error(&exact).min(1e12);
                 assert!(share < 1.0, "{share} of the allowed error at {node:?}, {view:?}");

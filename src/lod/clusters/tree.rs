@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
+use super::ways;
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure, Square};
 use crate::height::progress::Progress;
@@ -61,10 +62,12 @@ impl Node {
 }
 
 /// Where errors come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Errors {
     /// Measured against the samples.
     Measured,
+    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ways`](super::ways)).
+    ByLevel(Vec<f32>),
     /// Judnich & Ling 2012, eq. 2: half the parent's; the root's is the range of heights, metres.
     Halved(f32),
 }
@@ -101,11 +104,16 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Measures a field for blocks of `measure.cells` × `measure.cells` cells.
-    pub fn new(field: &Arc<Field>, measure: Measure, halved: bool, progress: &Progress) -> Self {
+    /// Measures a field for blocks of `measure.cells` × `measure.cells` cells. Without measured errors they are halved
+    /// from level to level; else they may be those of whole levels.
+    pub fn new(field: &Arc<Field>, measure: Measure, by_level: bool, progress: &Progress) -> Self {
         let bounds = Bounds::new(field, measure, progress);
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
-        let errors = if halved { Errors::Halved((high - low).max(0.0)) } else { Errors::Measured };
+        let errors = match (measure.errors, by_level) {
+            (false, _) => Errors::Halved((high - low).max(0.0)),
+            (true, true) => Errors::ByLevel(ways::errors(field, &bounds)),
+            (true, false) => Errors::Measured,
+        };
         let last = field.size().map(|n| n - 1);
         Self { bounds, errors, spacing: field.spacing, origin: field.origin, last }
     }
@@ -162,7 +170,7 @@ impl Tree {
         let lanes = |of: fn(&Square) -> f32| Vec4::new(of(&a), of(&b), of(&c), of(&d));
         let error = match self.errors {
             Errors::Measured => lanes(|square| square.error),
-            Errors::Halved(_) => Vec4::splat(self.error(node.level - 1, 0.0)),
+            Errors::Halved(_) | Errors::ByLevel(_) => Vec4::splat(self.error(node.level - 1, 0.0)),
         };
         Squares { error, range: [lanes(|square| square.range[0]), lanes(|square| square.range[1])] }
     }
@@ -184,8 +192,9 @@ impl Tree {
     /// The error of a square of a level in which `measured` was measured.
     #[inline]
     pub fn error(&self, level: u32, measured: f32) -> f32 {
-        match self.errors {
+        match &self.errors {
             Errors::Measured => measured,
+            Errors::ByLevel(errors) => errors[level as usize],
             Errors::Halved(root) => root / (1u64 << (self.root().level - level)) as f32,
         }
     }
