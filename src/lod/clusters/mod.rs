@@ -18,7 +18,7 @@
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
 //!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
 //! - with `morph=distance` every vertex has a weight by its own distance, so that edges agree by themselves; for that
-//!   the error is that of a whole level ([`ways`]), and finer levels reach farther than anywhere needed;
+//!   the error is that of a whole level (`ways`), and finer levels reach farther than anywhere needed;
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
 //! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
