@@ -9,10 +9,13 @@
 layout(location = 0) in ivec2 in_position;
 layout(location = 1) in float in_height;
 layout(location = 2) in float in_target;
-layout(location = 3) in float in_weight;
+layout(location = 3) in float in_further;
+layout(location = 4) in float in_morph;
+layout(location = 5) in uint in_regions;
 
 void main() {
     Instance instance = instance_attributes();
     ivec2 at = lattice_position(instance, turned_position(instance, in_position));
-    emit_vertex(at, morphed_height(in_height, in_target, in_weight), instance.level, instance.batch);
+    ExplicitVertex vertex = ExplicitVertex(in_position, in_height, in_target, in_further, in_morph, in_regions);
+    emit_vertex(at, explicit_height(instance, vertex), instance.level, instance.batch);
 }

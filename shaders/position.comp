@@ -21,7 +21,7 @@ void main() {
         Placed placed = placed(query.instance, vertex.position);
         answers[k] = relative_position(placed.at, placed.height);
     } else {
-        float height = morphed_height(vertex.height, vertex.target, vertex.morph);
+        float height = explicit_height(query.instance, vertex);
         ivec2 turned = turned_position(query.instance, vertex.position);
         answers[k] = relative_position(lattice_position(query.instance, turned), height);
     }

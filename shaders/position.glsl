@@ -112,7 +112,7 @@ float morphed_height(float finer, float coarser, float weight) {
     precise float difference = coarser - finer;
     precise float part = difference * weight;
     precise float height = finer + part;
-    return height;
+    return weight == 1.0 ? coarser : height;
 }
 
 float midpoint(float a, float b) {
@@ -171,6 +171,22 @@ float lattice_height(Instance instance, ivec2 turned) {
     if (weight == 0 || apart == ivec2(0)) return sampled;
     float target = midpoint(end_height(instance, turned - apart), end_height(instance, turned + apart));
     return morphed_height(sampled, target, unit_weight(weight));
+}
+
+float region_weight(Instance instance, uint region) {
+    if (region == 0) return 0.0;
+    uint slot = (region - 1) & 15;
+    uint stage = (region - 1) >> 4;
+    uint weight = get(instance, ivec2(slot / 4, slot % 4));
+    return unit_weight(clamp(weight, stage * ONE, (stage + 1) * ONE) - stage * ONE);
+}
+
+float explicit_height(Instance instance, ExplicitVertex vertex) {
+    uint region = vertex.regions & 255;
+    if (region == 0) return morphed_height(vertex.height, vertex.target, vertex.morph);
+    float weight = region_weight(instance, (vertex.regions >> 8) & 255);
+    float target = morphed_height(vertex.target, vertex.further, weight);
+    return morphed_height(vertex.height, target, region_weight(instance, region));
 }
 
 // Meshes with skirts: src/draw/skirts.rs.

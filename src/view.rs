@@ -87,6 +87,8 @@ pub struct View {
     pub near: f64,
     /// Error allowed.
     pub tolerance: Tolerance,
+    /// Time of the scene, seconds: for what goes on gradually. It may stand still, leap or go back.
+    pub time_s: f64,
 }
 
 /// How a box lies to the frustum.
@@ -327,6 +329,7 @@ mod tests {
             size: [320, 200],
             near: 0.1,
             tolerance: Tolerance { px, metric: Metric::Certified },
+            time_s: 0.0,
         }
     }
 

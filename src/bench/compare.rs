@@ -121,6 +121,8 @@ const EXACT: &[Exact] = &[
     ("not watertight", |e| e.watertight.map(|is| f64::from(u8::from(!is))), true),
     ("hole_pixels", |e| e.hole_pixels.map(|n| n as f64), true),
     ("skirt_pixels", |e| e.skirt_pixels.map(|n| n as f64), false),
+    ("waiting.pixels", |e| e.waiting.map(|w| w.pixels as f64), true),
+    ("waiting.excess_px", |e| e.waiting.map(|w| w.excess_px), true),
     ("pop.p99_px", |e| e.pop.as_ref().map(|p| p.p99_px), false),
     ("pop.max_px", |e| e.pop.as_ref().map(|p| p.max_px), false),
 ];

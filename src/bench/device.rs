@@ -117,6 +117,7 @@ impl Laboratory for DeviceLaboratory {
                 draws: list.draws.len() as u64,
                 commands: list.commands() as u64,
                 widening: list.widening,
+                waiting: list.waiting as u64,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
@@ -185,9 +186,13 @@ fn look(
     }
     pool.proof(frame, watertight::prove_list(field, view, technique.seams(), resident, &stage.list));
     let is_kept = stage.list.widening == 1.0;
-    pool.errors(frame, &geometric::errors(field, view, resident, &stage.list), is_kept.then_some(view.tolerance.px));
+    let errors = geometric::errors(field, view, resident, &stage.list);
+    pool.errors(frame, &errors, is_kept.then_some(view.tolerance.px));
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
     let depth = stage.depth();
+    if stage.list.waiting > 0 {
+        pool.waiting(field, view, errors.screen_px.max, &depth);
+    }
     pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
     pool.hole_pixels(truth.hole_pixels(view, &picture).len());

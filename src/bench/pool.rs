@@ -5,13 +5,15 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use image::{RgbImage, RgbaImage};
 
-use super::rows::{AngleBin, Bin, Economy, Errors, ImageError, PeersError, Pop, Reference, Summary, Within, Worst};
+use super::rows::{
+    AngleBin, Bin, Economy, Errors, ImageError, PeersError, Pop, Reference, Summary, Waiting, Within, Worst,
+};
 use super::run::Scene;
 use crate::height::{Field, save};
 use crate::measure::economy::{self, overdraw};
 use crate::measure::histogram::Histogram;
 use crate::measure::watertight::{CounterExample, Proof};
-use crate::measure::{geometric, image as pictures, peers, pop, reference};
+use crate::measure::{beyond, geometric, image as pictures, peers, pop, reference};
 use crate::view::View;
 
 /// Samples of the largest field that near-optimal meshes are made of: larger ones take minutes.
@@ -46,6 +48,7 @@ pub struct Pool {
     covered: u64,
     peers: peers::Pool,
     pictures: Vec<pictures::Difference>,
+    waiting: Waiting,
     /// Picture and difference of the worst frame so far.
     shots: Option<(usize, RgbImage, RgbImage)>,
 }
@@ -89,6 +92,15 @@ impl Pool {
         if self.worst.is_none_or(|(_, px)| errors.screen_px.max > px) {
             self.worst = Some((frame, errors.screen_px.max));
         }
+    }
+
+    /// A frame in which a refinement waited, by its largest error, and its depth.
+    pub fn waiting(&mut self, field: &Field, view: &View, max_px: f64, depth: &[f32]) {
+        let excess_px = (max_px - view.tolerance.px).max(0.0);
+        self.waiting.frames += 1;
+        self.waiting.kept += usize::from(excess_px == 0.0);
+        self.waiting.pixels += beyond::pixels(field, view, depth);
+        self.waiting.excess_px = self.waiting.excess_px.max(excess_px);
     }
 
     /// Whether a frame was proven to be one surface.
@@ -206,6 +218,7 @@ impl Pool {
                 max: peers.max,
             }),
             worst,
+            waiting: Some(self.waiting),
         })
     }
 

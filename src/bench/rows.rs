@@ -171,6 +171,13 @@ pub struct Times {
     /// kept.
     #[serde(with = "extended", default = "kept")]
     pub widening: f64,
+    /// Instances in sight that were coarser than the tolerance allows because what is finer was not there yet, the most
+    /// of any frame.
+    #[serde(default)]
+    pub waiting: u64,
+    /// Frames with such instances.
+    #[serde(default)]
+    pub waiting_frames: usize,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
     /// The most memory that the process has held, bytes.
@@ -224,6 +231,23 @@ pub struct Errors {
     pub peers_px: Option<PeersError>,
     /// The frame with the largest screen error.
     pub worst: Option<Worst>,
+    /// What is beyond the tolerance because something finer was not there yet.
+    #[serde(default)]
+    pub waiting: Option<Waiting>,
+}
+
+/// Frames in which a refinement waited, counted apart: only there may a certified bound be exceeded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Waiting {
+    /// Such frames, of those measured.
+    pub frames: usize,
+    /// Those of them that kept the tolerance all the same.
+    pub kept: usize,
+    /// Their pixels beyond the tolerance.
+    pub pixels: u64,
+    /// How far beyond it the largest screen error of them is, pixels.
+    #[serde(with = "extended")]
+    pub excess_px: f64,
 }
 
 /// A quantity over all samples in view.

@@ -58,6 +58,8 @@ pub struct Frame {
     pub commands: u64,
     /// What the tolerance was multiplied by: 1 where it was kept.
     pub widening: f64,
+    /// Instances in sight whose refinement waited.
+    pub waiting: u64,
 }
 
 /// What drawing a scene once took.
@@ -214,7 +216,7 @@ impl Flights {
             let path = paths::find(&case.path).with_context(|| format!("no path {}", case.path))?;
             (self.scene, self.poses, self.near) = (case.scene(), path.poses(field, case.frames), paths::near(field));
         }
-        Ok(self.poses.iter().map(|pose| pose.view(case.size, self.near, case.tolerance())).collect())
+        Ok(paths::views(&self.poses, self.near, case.size, case.tolerance()))
     }
 }
 
@@ -258,6 +260,8 @@ impl Times {
             draws: counts(|frame| frame.draws),
             commands: counts(|frame| frame.commands),
             widening: frames.iter().map(|frame| frame.widening).fold(1.0, f64::max),
+            waiting: frames.iter().map(|frame| frame.waiting).max().unwrap_or(0),
+            waiting_frames: frames.iter().filter(|frame| frame.waiting > 0).count(),
             device_bytes: timed.device_bytes,
             host_bytes: host_bytes(),
         }

@@ -397,7 +397,7 @@ impl ViewArgs {
             Some(width) => bail!("--ortho {width}: expected a positive number of metres"),
             None => Lens::Perspective { fov_x: self.fov.to_radians() },
         };
-        Ok(View { eye, world_from_eye, lens, size: self.size, near, tolerance })
+        Ok(View { eye, world_from_eye, lens, size: self.size, near, tolerance, time_s: 0.0 })
     }
 }
 
@@ -433,6 +433,7 @@ impl Whole {
             size,
             near: radius * 1e-3,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         };
         // The rectangle around the corners on the screen, if all are in front of the eye.
         let outline = |view: &View| {

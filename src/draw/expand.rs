@@ -1,7 +1,7 @@
 //! From a draw list to its triangles, on the CPU: what the device draws, without a device.
 
 use super::layout::Frame;
-use super::place::{lattice_position, morphed_height, placed, turned_position};
+use super::place::{explicit_height, lattice_position, placed, turned_position};
 use super::skirts::is_skirted;
 use super::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use crate::height::Field;
@@ -85,7 +85,7 @@ fn each_triangle(
 }
 
 /// Calls `visit` for every triangle of one draw: its instance, and its corners as `corner` tells them by instance and
-/// index, in the order of its winding. `geometry` is what the draw's indices address ([`geometry`]).
+/// index (the draw's first vertex added), in the order of its winding. `geometry` is what the draw's indices address ([`geometry`]).
 pub fn assemble<T>(
     geometry: &Geometry,
     draw: &Draw,
@@ -94,7 +94,7 @@ pub fn assemble<T>(
 ) {
     let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
     for instance in draw.instances.clone() {
-        let corner = |index: u32| corner(instance, index);
+        let corner = |index: u32| corner(instance, index + draw.first_vertex);
         match draw.topology {
             Topology::Triangles => {
                 for t in indices.chunks_exact(3) {
@@ -133,7 +133,7 @@ fn corner(
         Source::Resident | Source::Streamed => {
             let vertex = &geometry.vertices[index as usize];
             let [x, z] = lattice_position(frame, instance, turned_position(instance, vertex.position));
-            Corner { x, z, y: morphed_height(vertex.height, vertex.target, vertex.morph) }
+            Corner { x, z, y: explicit_height(instance, vertex) }
         }
     }
 }

@@ -116,8 +116,13 @@ shared! {
         height: float,
         /// Height of the coarser shape (morph weight 1), metres.
         target: float,
-        /// Morph weight, 0 the finer shape and 1 the coarser one.
+        /// Where the target itself goes with the second region's weight, metres.
+        further: float,
+        /// Morph weight, 0 the finer shape and 1 the coarser one, where no region says it.
         morph: float,
+        /// Regions of the instance's weights, a byte each: of the vertex, and of its target (0: none). See
+        /// `draw::weights::region`.
+        regions: uint,
     }
 
     /// What the vertex program made of a vertex, when it is captured.

@@ -55,6 +55,8 @@ pub struct Draw {
     pub indices: Range<u32>,
     /// Which of the list's instances.
     pub instances: Range<u32>,
+    /// Added to each index: one pattern of indices serves meshes that lie one after the other.
+    pub first_vertex: u32,
 }
 
 /// A change to the resident geometry, made before the list is drawn.
@@ -119,6 +121,8 @@ pub struct DrawList {
     /// What the view's tolerance was multiplied by because the list would not have fitted its limits: 1 where
     /// nothing was, infinite where no tolerance was kept.
     pub widening: f64,
+    /// Instances in sight that are coarser than the tolerance allows because something finer is not there yet.
+    pub waiting: usize,
 }
 
 /// The most that any list of a technique holds: buffers of this size are made once.
@@ -194,6 +198,7 @@ impl Default for DrawList {
             submission: Submission::default(),
             parameters: Vec::new(),
             widening: 1.0,
+            waiting: 0,
         }
     }
 }
@@ -210,6 +215,7 @@ impl DrawList {
         self.submission = Submission::default();
         self.parameters.clear();
         self.widening = 1.0;
+        self.waiting = 0;
     }
 
     /// Triangles the list submits, degenerate ones included.
@@ -286,7 +292,13 @@ mod tests {
     fn parts_are_the_whole_in_order() {
         for topology in [Topology::Triangles, Topology::Strip] {
             for count in [0, 3, 30, 33, 300] {
-                let draw = Draw { source: Source::Lattice, topology, indices: 7..7 + count, instances: 2..11 };
+                let draw = Draw {
+                    source: Source::Lattice,
+                    topology,
+                    indices: 7..7 + count,
+                    instances: 2..11,
+                    first_vertex: 0,
+                };
                 for size in [1, 2, 7, 16, 40, 1000] {
                     let parts = draw.parts(size);
                     let joined: Vec<_> = parts.iter().flat_map(triangles).collect();

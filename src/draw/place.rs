@@ -1,8 +1,9 @@
 //! Where lattice vertices lie: the CPU twin of `shaders/position.glsl`, function by function.
 
 use super::distance::{self, is_by_distance};
-use super::layout::{Frame, Instance};
+use super::layout::{ExplicitVertex, Frame, Instance};
 use super::skirts::{self, SKIRT, is_skirted};
+use super::weights::region_weight;
 use super::weights::{FINER, ONE, Slot, get, inside, is_stitched, slot, vertex_level};
 use crate::height::{Field, Samples};
 use crate::view::View;
@@ -242,6 +243,18 @@ fn midpoint(a: f32, b: f32) -> f32 {
     (a + b) * 0.5
 }
 
+/// Height of a vertex that carries its own: its target goes on as far as the second region's weight says, and it goes
+/// to its target as far as the first one's, or its own, says.
+pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
+    let region = vertex.regions & 255;
+    if region == 0 {
+        return morphed_height(vertex.height, vertex.target, vertex.morph);
+    }
+    let weight = |region: u32| unit_weight(region_weight(instance, region));
+    let target = morphed_height(vertex.target, vertex.further, weight(vertex.regions >> 8 & 255));
+    morphed_height(vertex.height, target, weight(region))
+}
+
 /// Position relative to the eye in metres, world axes, of a lattice position and height.
 pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
     let [x, z] = relative_plan(frame, at);
@@ -253,7 +266,7 @@ pub fn relative_plan(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
     [0, 1].map(|k| (at[k] - frame.anchor[k]) as f32 * frame.spacing[k] + frame.anchor_relative[k])
 }
 
-/// Height between two shapes: `weight` 0 is the finer one, 1 the coarser one.
+/// Height between two shapes: `weight` 0 is the finer one, 1 the coarser one, both to the bit.
 pub fn morphed_height(finer: f32, coarser: f32, weight: f32) -> f32 {
-    finer + (coarser - finer) * weight
+    if weight == 1.0 { coarser } else { finer + (coarser - finer) * weight }
 }

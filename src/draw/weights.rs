@@ -33,6 +33,21 @@ pub fn inside(quadrant: usize) -> Slot {
     (0, quadrant as u32)
 }
 
+/// What a vertex that carries its height says to have the weight of a slot: on the way to the next level (stage 0), or
+/// from that to the one after it (1). From 1 to 32.
+pub fn region((word, byte): Slot, stage: u32) -> u32 {
+    1 + 16 * stage + 4 * word as u32 + byte
+}
+
+/// The weight of a region, in [`ONE`]s, at most one; 0 of none.
+pub fn region_weight(instance: &Instance, region: u32) -> u32 {
+    if region == 0 {
+        return 0;
+    }
+    let (slot, stage) = ((region - 1) & 15, (region - 1) >> 4);
+    get(instance, (slot as usize / 4, slot % 4)).saturating_sub(stage * ONE).min(ONE)
+}
+
 /// Weights that all quadrants share: of the inside, and of the sides x = 0, z = 0, x = cells and z = cells.
 pub fn uniform(inside: u32, [x_first, z_first, x_last, z_last]: [u32; 4]) -> [u32; 4] {
     let sides = |x: u32, z: u32| x * 0x0101 + z * 0x0101_0000;

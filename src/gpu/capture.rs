@@ -84,6 +84,7 @@ impl Capture {
             let geometry = expand::geometry(draw.source, resident, list);
             let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
             let (first, last) = indices.iter().fold((u32::MAX, 0), |(low, high), &k| (low.min(k), high.max(k)));
+            let [first, last] = [first, last].map(|k| k + draw.first_vertex);
             let place = CapturedPart {
                 base: 0,
                 first_instance: draw.instances.start,
@@ -134,7 +135,8 @@ impl Capture {
                     raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(place));
                     let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
                     let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
-                    raw.cmd_draw_indexed(commands, indices, instances, first_index, 0, first_instance);
+                    let offset = draw.first_vertex as i32;
+                    raw.cmd_draw_indexed(commands, indices, instances, first_index, offset, first_instance);
                 }
                 raw.cmd_end_rendering(commands);
             }

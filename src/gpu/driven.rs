@@ -222,12 +222,14 @@ impl Driven {
 
 /// A command as the draw that it is.
 fn draw(command: &[u8]) -> Draw {
-    let [indices, instances, first_index, _, first_instance]: [u32; 5] = bytemuck::pod_read_unaligned(command);
+    let [indices, instances, first_index, first_vertex, first_instance]: [u32; 5] =
+        bytemuck::pod_read_unaligned(command);
     Draw {
         source: Source::Lattice,
         topology: Topology::Triangles,
         indices: first_index..first_index + indices,
         instances: first_instance..first_instance + instances,
+        first_vertex,
     }
 }
 

@@ -270,22 +270,21 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
                 (0, PAIR, offset_of!(ExplicitVertex, position)),
                 (1, FLOAT, offset_of!(ExplicitVertex, height)),
                 (2, FLOAT, offset_of!(ExplicitVertex, target)),
-                (3, FLOAT, offset_of!(ExplicitVertex, morph)),
+                (3, FLOAT, offset_of!(ExplicitVertex, further)),
+                (4, FLOAT, offset_of!(ExplicitVertex, morph)),
+                (5, UINT, offset_of!(ExplicitVertex, regions)),
             ],
         ),
     };
-    let mut instance = vec![
+    let instance = [
         (8, PAIR, offset_of!(Instance, origin)),
         (9, UINT, offset_of!(Instance, cells)),
         (10, vk::Format::R32_SINT, offset_of!(Instance, shift)),
         (11, UINT, offset_of!(Instance, turns)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
+        (14, WEIGHTS, offset_of!(Instance, weights)),
     ];
-    // Explicit vertices have weights of their own.
-    if source == Source::Lattice {
-        instance.push((14, WEIGHTS, offset_of!(Instance, weights)));
-    }
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (stride as u32, attributes)
 }

@@ -228,7 +228,8 @@ mod tests {
 
     #[test]
     fn pieces_are_the_draws_in_order_and_the_rest_by_pipeline() {
-        let draw = |source| Draw { source, topology: Topology::Triangles, indices: 0..3, instances: 0..1 };
+        let draw =
+            |source| Draw { source, topology: Topology::Triangles, indices: 0..3, instances: 0..1, first_vertex: 0 };
         let mut draws = vec![draw(Source::Lattice); 5];
         draws.extend(vec![draw(Source::Streamed); 3]);
         assert_eq!(pieces(&draws, 100).len(), 8);

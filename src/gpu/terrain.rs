@@ -282,7 +282,8 @@ impl Terrain {
                     // SAFETY: ranges lie in the bound buffers.
                     unsafe {
                         let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
-                        raw.cmd_draw_indexed(r.commands, indices, instances, first_index, 0, first_instance);
+                        let offset = draw.first_vertex as i32;
+                        raw.cmd_draw_indexed(r.commands, indices, instances, first_index, offset, first_instance);
                     }
                 }
             }
@@ -323,7 +324,7 @@ fn command_bytes(draw: &Draw) -> [u8; COMMAND] {
         draw.indices.len() as u32,
         draw.instances.len() as u32,
         draw.indices.start,
-        0, // vertex offset
+        draw.first_vertex,
         draw.instances.start,
     ];
     bytemuck::cast(words)

@@ -87,6 +87,27 @@ pub fn has_land(field: &Field, first: [i32; 2], last: [i32; 2]) -> bool {
     field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).iter().any(|t| is_land(field, t)))
 }
 
+/// Height of the samples' own triangles, metres, at a position among the samples; `None` outside or where the triangle
+/// has no data.
+pub fn height_at(field: &Field, at: [f64; 2]) -> Option<f64> {
+    let last = field.size().map(|n| f64::from(n) - 1.0);
+    if !(0..2).all(|k| (0.0..=last[k]).contains(&at[k])) {
+        return None;
+    }
+    let [i, j] = [0, 1].map(|k| at[k].min(last[k] - 1.0) as i32);
+    let weights = |triangle: &[[i32; 2]; 3]| {
+        let [a, b, c] = triangle.map(|p| [0, 1].map(|k| at[k] - f64::from(p[k])));
+        let area = |p: [f64; 2], q: [f64; 2]| p[1] * q[0] - p[0] * q[1];
+        [area(b, c), area(c, a), area(a, b)]
+    };
+    let triangle = rtin::cell(i, j).into_iter().max_by(|a, b| {
+        let least = |t| weights(t).into_iter().fold(f64::INFINITY, f64::min);
+        least(a).total_cmp(&least(b))
+    })?;
+    let height = |[x, z]: [i32; 2]| f64::from(field.height(x as u32, z as u32));
+    is_land(field, &triangle).then(|| weights(&triangle).iter().zip(triangle).map(|(w, p)| w * height(p)).sum())
+}
+
 /// The largest vertical distance, metres, of an up-facing triangle from the field's samples inside it,
 /// holes excepted.
 pub fn deviation(field: &Field, triangle: &Triangle) -> f32 {
@@ -103,6 +124,7 @@ pub fn deviation(field: &Field, triangle: &Triangle) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::height::{Holes, Samples};
 
     fn corner(x: i32, z: i32, y: f32) -> Corner {
         Corner { x, z, y }
@@ -132,5 +154,30 @@ mod tests {
             assert_eq!((v.0, v.1), (e.0, e.1));
             assert!((v.2 - e.2).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn heights_between_samples_are_those_of_their_triangles() {
+        let heights = (0..20).map(|k| (k * 7 % 11) as f32);
+        let mut holes = Holes::none(20);
+        holes.insert(19);
+        let field = Field::new(Samples::F32(heights.collect()), [5, 4], [3.0, 2.0], holes);
+        let mut seen = 0;
+        for (i, j) in (0..3).flat_map(|j| (0..4).map(move |i| (i, j))) {
+            for triangle in rtin::cell(i, j) {
+                let [a, b, c] =
+                    triangle.map(|[x, z]| [f64::from(x), f64::from(z), f64::from(field.height(x as u32, z as u32))]);
+                for [u, v] in [[0.1, 0.1], [0.2, 0.3], [0.3, 0.6], [0.6, 0.1]] {
+                    let at = |k: usize| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]);
+                    let height = height_at(&field, [at(0), at(1)]);
+                    if is_land(&field, &triangle) {
+                        assert!((height.unwrap() - at(2)).abs() < 1e-9, "cell ({i}, {j}): {height:?}, not {}", at(2));
+                        seen += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(seen, 4 * 23, "all triangles but the one at the hole");
+        assert_eq!([[3.9, 2.9], [-0.1, 0.0], [0.0, 3.1]].map(|at| height_at(&field, at)), [None; 3]);
     }
 }

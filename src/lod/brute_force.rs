@@ -69,6 +69,7 @@ impl Technique for BruteForce {
             topology: Topology::Triangles,
             indices: 0..self.mesh.indices.len() as u32,
             instances: 0..self.instances.len() as u32,
+            first_vertex: 0,
         });
     }
 

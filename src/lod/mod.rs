@@ -6,6 +6,7 @@ pub mod brute_force;
 pub mod clusters;
 pub mod geomipmap;
 pub mod settings;
+pub mod smooth_tiles;
 pub mod sorted_strips;
 
 use std::sync::Arc;
@@ -54,6 +55,12 @@ pub trait Technique: Send {
     /// Whether the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
+    /// Whether another selection in the view of the last one gives the same list: nothing goes on gradually, and nothing
+    /// waits.
+    fn is_settled(&self) -> bool {
+        true
+    }
+
     /// How its lattice vertices move.
     fn morph(&self) -> Morph {
         Morph::No
@@ -97,7 +104,8 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] = &[brute_force::ENTRY, geomipmap::ENTRY, sorted_strips::ENTRY, clusters::ENTRY];
+pub const TECHNIQUES: &[Entry] =
+    &[brute_force::ENTRY, geomipmap::ENTRY, smooth_tiles::ENTRY, sorted_strips::ENTRY, clusters::ENTRY];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

@@ -212,6 +212,7 @@ mod tests {
             topology: Topology::Triangles,
             indices: 0..corners.len() as u32,
             instances: 0..1,
+            first_vertex: 0,
         });
         list
     }
@@ -225,6 +226,7 @@ mod tests {
             size: [4 * width, 4 * width],
             near: 1.0,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         }
     }
 

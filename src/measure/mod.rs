@@ -2,6 +2,7 @@
 //! surface, what it costs and what could be had for less. Pure computation on what
 //! [`draw::expand`](crate::draw::expand) says is drawn, and on pictures handed in as pixels.
 
+pub mod beyond;
 pub mod economy;
 pub mod geometric;
 pub mod hidden;

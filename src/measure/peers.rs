@@ -126,6 +126,7 @@ mod tests {
             size: [96, 54],
             near: 0.1,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         }
     }
 

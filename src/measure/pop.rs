@@ -161,6 +161,7 @@ mod tests {
             topology: Topology::Triangles,
             indices: 0..6,
             instances: 0..1,
+            first_vertex: 0,
         });
         list
     }
@@ -174,6 +175,7 @@ mod tests {
             size: [640, 640],
             near: 1.0,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         }
     }
 

@@ -86,6 +86,7 @@ mod tests {
                 size: [300, 200],
                 near: 5.0,
                 tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+                time_s: 0.0,
             };
             let projection = Projection::new(&view);
             for k in 0..8000 {

@@ -70,6 +70,9 @@ const ERRORS: &[Column] = &[
     ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
     ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
     ("skirts, px", |r| r.errors.as_ref()?.skirt_pixels.map(|n| n.to_string())),
+    ("waited, frames", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| w.frames.to_string())),
+    ("and beyond, px", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| w.pixels.to_string())),
+    ("by at most, px", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| number(w.excess_px))),
     ("watertight", |r| r.errors.as_ref()?.watertight.map(|is| if is { "yes" } else { "<b>no</b>" }.to_string())),
 ];
 

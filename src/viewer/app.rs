@@ -21,7 +21,7 @@ use super::{Setup, Summary};
 use crate::gpu::instance::Messages;
 use crate::gpu::{Instance, swapchain};
 use crate::lod::{Entry, Settings};
-use crate::view::Lens;
+use crate::view::{Lens, View};
 
 /// How long to sleep while there is nothing to draw to.
 const REST: Duration = Duration::from_millis(20);
@@ -124,7 +124,8 @@ impl<'a> App<'a> {
         let dt = self.last_frame.replace(now).map(|last| (now - last).as_secs_f64());
         let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
         self.session.advance(self.setup, &motion, &open.stage.figures, dt.unwrap_or(0.0));
-        let view = self.session.view(self.setup, size);
+        let time_s = self.started.elapsed().as_secs_f64();
+        let view = View { time_s, ..self.session.view(self.setup, size) };
         let Session { look, frozen, wants_copy, .. } = self.session;
         let scale = open.window.scale_factor() as f32;
         let overlay = |figures: &Figures| {
@@ -136,7 +137,7 @@ impl<'a> App<'a> {
             };
             hud::paint(&open.context, size, scale, &content)
         };
-        let look = look.after(self.started.elapsed().as_secs_f64());
+        let look = look.after(time_s);
         let shot = Shot { view: &view, look: &look, frozen, wants_copy };
         if let Some(shown) = open.stage.show(self.setup, &shot, overlay)? {
             if let Some(dt) = dt {

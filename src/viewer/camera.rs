@@ -238,6 +238,7 @@ mod tests {
             size: [320, 200],
             near: 0.1,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         })
     }
 

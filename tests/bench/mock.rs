@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::Result;
 use cuesta::bench::rows::{
     AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, Plan, Pop, Reference,
-    Summary, Within, Worst,
+    Summary, Waiting, Within, Worst,
 };
 use cuesta::bench::run::{Ended, Frame, Laboratory, Run, Scene, Timed};
 use cuesta::bench::{Case, SCHEMA, Terrain};
@@ -62,6 +62,7 @@ impl Laboratory for Mock {
                 draws: 12,
                 commands: 1,
                 widening: 1.0,
+                waiting: 0,
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);
@@ -70,6 +71,7 @@ impl Laboratory for Mock {
 
     fn measure(&mut self, scene: &Scene) -> Result<Errors> {
         self.calls.push(format!("measure {}", scene.case));
+        assert!(scene.views.windows(2).all(|pair| pair[0].time_s < pair[1].time_s), "the scene's time goes on");
         let case = scene.case;
         let is_truth = case.technique == "brute-force";
         let is_paper = case.metric == "paper";
@@ -100,6 +102,7 @@ impl Laboratory for Mock {
         });
         errors.watertight = Some(true);
         (errors.hole_pixels, errors.skirt_pixels) = (Some(0), Some(0));
+        errors.waiting = Some(Waiting { frames: 2, kept: 1, pixels: 77, excess_px: max / 3.0 });
         errors.economy = Some(Economy {
             pixels_per_triangle: (-2..=8).map(|k| bin(k, (1000 - 30 * (k - peak - 3).pow(2)).max(3) as u64)).collect(),
             hidden_share: 0.3,

@@ -25,6 +25,9 @@ const BREAKERS: &[Breaker] = &[
     ("one surface", "a triangle flipped", "Fold", "131 × 67", |field| streamed(field, flip_a_triangle)),
     ("one surface", "a triangle dropped", "Gap", "real mountains", |field| streamed(field, drop_a_triangle)),
     ("one surface", "a vertex one ulp off", "Crack", "tiled", |field| streamed(field, nudge_a_vertex)),
+    ("one surface", "a side a step ahead of its other tile", "Crack", "131 × 67", |field| {
+        Box::new(Changed { seams: Seams::Shared, inner: smooth_tiles(field), change: nudge_a_side })
+    }),
     ("one surface", "too narrow a frustum", "Gap", "131 × 67", |field| in_another_view(field, narrower)),
     ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| each_depth(list, 0.5))),
     ("one surface", "a side without its skirt", "Seam", "131 × 67", |field| skirted(field, drop_a_skirt)),
@@ -69,7 +72,7 @@ fn every_law_fails_on_what_breaks_it() {
         let Some((_, field)) = fields.iter().find(|(name, _)| name == field) else { continue };
         let views = cases::views(field);
         let mut technique = build(field);
-        let mut subject = Subject { field, technique: &mut *technique, views: &views };
+        let mut subject = Subject { field, technique: &mut *technique, views: &views, time_s: 0.0 };
         let law = LAWS.iter().find(|l| l.name == *law).expect("a law of the table");
         match (law.check)(&mut subject) {
             Ok(()) => panic!("{}: not broken by {breaker}", law.name),
@@ -94,7 +97,7 @@ fn unbroken_it_keeps_the_laws() {
         Blocks::boxed(field, true, &[0, 1]),
     ];
     for mut technique in whole {
-        let mut subject = Subject { field, technique: &mut *technique, views: &cases::views(field) };
+        let mut subject = Subject { field, technique: &mut *technique, views: &cases::views(field), time_s: 0.0 };
         // Clusters have blocks of several levels.
         let has_levels = subject.technique.seams() == Seams::Shared;
         for law in LAWS.iter().filter(|law| has_levels || law.name != "neighbours within one level") {
@@ -125,6 +128,18 @@ fn clusters(field: &Arc<Field>) -> Box<dyn Technique> {
     let entry = lod::find("clusters").expect("a row of the table");
     let choices = [("block", "8"), ("seams", "skirts"), ("morph", "on")].map(|(key, word)| (key.into(), word.into()));
     (entry.build)(Arc::clone(field), &Settings::new(entry, None, &choices).expect("the table's own values"))
+}
+
+fn smooth_tiles(field: &Arc<Field>) -> Box<dyn Technique> {
+    let entry = lod::find("smooth-tiles").expect("a row of the table");
+    let settings = Settings::new(entry, None, &[("tile".into(), "9".into())]).expect("a tile's size");
+    (entry.build)(Arc::clone(field), &settings)
+}
+
+/// One step of a morph on the last sides of the tile in the middle of the list.
+fn nudge_a_side(list: &mut DrawList) {
+    let middle = list.instances.len() / 2;
+    list.instances.iter_mut().skip(middle).take(1).for_each(|tile| tile.weights[2] += 0x0101_0101);
 }
 
 fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
@@ -216,12 +231,24 @@ impl Technique for Streamed {
         {
             list.streamed.indices.push(list.streamed.vertices.len() as u32);
             let position = [corner.x, corner.z];
-            list.streamed.vertices.push(ExplicitVertex { position, height: corner.y, target: corner.y, morph: 0.0 });
+            list.streamed.vertices.push(ExplicitVertex {
+                position,
+                height: corner.y,
+                target: corner.y,
+                morph: 0.0,
+                ..ExplicitVertex::default()
+            });
         }
         (self.change)(&mut list.streamed);
         list.instances.push(Instance::default());
         let indices = 0..list.streamed.indices.len() as u32;
-        list.draws.push(Draw { source: Source::Streamed, topology: Topology::Triangles, indices, instances: 0..1 });
+        list.draws.push(Draw {
+            source: Source::Streamed,
+            topology: Topology::Triangles,
+            indices,
+            instances: 0..1,
+            first_vertex: 0,
+        });
     }
     fn keeps_tolerance(&self) -> bool {
         true
@@ -339,7 +366,13 @@ impl Technique for Blocks {
             let border = &self.mesh.borders[level as usize][usize::from(self.mask(at))];
             for indices in [border, &self.mesh.centres[level as usize]].map(Clone::clone) {
                 let instances = first..first + 1;
-                list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+                list.draws.push(Draw {
+                    source: Source::Lattice,
+                    topology: Topology::Triangles,
+                    indices,
+                    instances,
+                    first_vertex: 0,
+                });
             }
         }
     }

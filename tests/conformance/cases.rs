@@ -208,7 +208,7 @@ pub fn views(field: &Field) -> Vec<(&'static str, View)> {
 fn perspective(eye: DVec3, world_from_eye: glam::DMat3, degrees: f64, extent: f64) -> View {
     let lens = Lens::Perspective { fov_x: degrees.to_radians() };
     let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
-    View { eye, world_from_eye, lens, size: [320, 180], near: extent / 1e4, tolerance }
+    View { eye, world_from_eye, lens, size: [320, 180], near: extent / 1e4, tolerance, time_s: 0.0 }
 }
 
 fn orthographic(eye: DVec3, world_from_eye: glam::DMat3, width: f64) -> View {

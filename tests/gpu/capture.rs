@@ -31,8 +31,13 @@ fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view
 fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn Technique) {
     let view = aslant(field, [160, 100], 2.0);
     let mut stage = stage(gpu, field, technique, &view);
-    let captured = stage.capture(technique, &view).unwrap();
-    let frame = Frame::placing(field, &view);
+    assert_same(&mut stage, technique, field, &view, name);
+}
+
+/// What the device draws of the last list is what the list says.
+fn assert_same(stage: &mut Stage, technique: &mut dyn Technique, field: &Arc<Field>, view: &View, name: &str) {
+    let captured = stage.capture(technique, view).unwrap();
+    let frame = Frame::placing(field, view);
     let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &stage.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
     assert_eq!(expanded[1].is_empty(), technique.seams() == Seams::Shared, "{name}");
@@ -60,6 +65,8 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters:draw-per-block", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters:gpu-driven", &["block=8", "morph=on"]),
+                ("smooth-tiles", &["tile=17"]),
+                ("smooth-tiles", &["tile=9", "morph=off"]),
                 ("clusters:gpu-driven", &["block=8", "seams=skirts", "morph=on"]),
                 ("clusters", &["block=8", "morph=distance"]),
                 ("clusters:draw-per-block", &["block=8", "morph=distance"]),
@@ -72,6 +79,28 @@ fn as_drawn_is_as_expanded_to_the_bit() {
         let field = mountains();
         for way in [Way::Resident, Way::Streamed, Way::Uploaded, Way::Strips] {
             compare(gpu, &field, &format!("{way:?}"), &mut Explicit::new(&field, way));
+        }
+    });
+}
+
+#[test]
+fn chunks_that_morph_and_are_rebuilt_are_as_expanded_in_every_frame() {
+    on_device(|gpu| {
+        let field = Arc::new(synth::synth(synth::Kind::Fractal, [193, 160], 9));
+        let start = aslant(&field, [160, 100], 2.0);
+        for settings in [["tile=9", "rebuild=3", "clock=frames"], ["tile=17", "rebuild=100000", "clock=speed"]] {
+            let mut technique = technique(&field, "smooth-tiles", &settings);
+            let mut stage = stage(gpu, &field, technique.as_mut(), &start);
+            let mut rebuilt = 0;
+            for k in 1..30 {
+                // Forwards, and back at twice the speed.
+                let along = f64::from(if k < 20 { k } else { 60 - 2 * k });
+                let view = View { eye: start.eye + start.forward() * 12.0 * along, ..start };
+                stage.draw(technique.as_mut(), &view, Copy::Nothing).unwrap();
+                rebuilt += usize::from(!stage.list.uploads.is_empty());
+                assert_same(&mut stage, technique.as_mut(), &field, &view, &format!("{settings:?}, frame {k}"));
+            }
+            assert!(rebuilt > 5, "{settings:?}: chunks came in {rebuilt} frames");
         }
     });
 }

@@ -28,6 +28,7 @@ fn view(eye: DVec3, pitch: f64) -> View {
         size: [160, 100],
         near: 0.1,
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

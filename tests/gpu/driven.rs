@@ -100,6 +100,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
             px: 0.05 + 6.0 * random(seed).powi(3),
             metric: if random(seed) < 0.7 { Metric::Certified } else { Metric::Paper },
         },
+        time_s: 0.0,
     }
 }
 
@@ -194,7 +195,7 @@ fn what_does_not_fit_is_told_and_drawn_coarse() {
         let tolerance = Tolerance { px: 1e-4, metric: Metric::Certified };
         let lens = Lens::Perspective { fov_x: 1.8 };
         let rotation = View::turned(0.0, -90.0, 0.0);
-        let view = View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance };
+        let view = View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance, time_s: 0.0 };
         let mut technique = technique(&field, "clusters:gpu-driven", &["block=8"]);
         let mut stage = stage(gpu, &field, technique.as_ref());
         stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();

@@ -10,6 +10,7 @@ mod layout;
 mod neck;
 mod plan;
 mod skirts;
+mod soak;
 mod twin;
 
 use std::sync::Arc;
@@ -105,6 +106,7 @@ pub(crate) fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
         size,
         near: 1.0,
         tolerance: Tolerance { px, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

@@ -34,7 +34,13 @@ impl Explicit {
             .map(|[x, z]| {
                 let height = field.height(x as u32, z as u32);
                 // Half way between two wrong heights; exact in f32 for heights of whole halves.
-                ExplicitVertex { position: [x, z], height: height - 64.0, target: height + 64.0, morph: 0.5 }
+                ExplicitVertex {
+                    position: [x, z],
+                    height: height - 64.0,
+                    target: height + 64.0,
+                    morph: 0.5,
+                    ..ExplicitVertex::default()
+                }
             })
             .collect();
         let index = |[x, z]: [i32; 2]| (z * w + x) as u32;
@@ -86,7 +92,7 @@ impl Technique for Explicit {
         let step = if self.way == Way::Strips { row } else { self.mesh.indices.len() };
         for first in (0..self.mesh.indices.len()).step_by(step) {
             let indices = first as u32..(first + step) as u32;
-            list.draws.push(Draw { source, topology, indices, instances: 0..1 });
+            list.draws.push(Draw { source, topology, indices, instances: 0..1, first_vertex: 0 });
         }
         if source == Source::Streamed {
             list.streamed = self.mesh.clone();

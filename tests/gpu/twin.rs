@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame};
-use cuesta::draw::place::{lattice_position, morphed_height, placed, relative_position, turned_position};
+use cuesta::draw::place::{explicit_height, lattice_position, placed, relative_position, turned_position};
 use cuesta::draw::skirts::{self, is_skirted};
 use cuesta::draw::{DrawList, Instance, Morph, Seams};
 use cuesta::gpu::Gpu;
@@ -61,9 +61,19 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             position: [(k % 37) as i32, (k / 37) as i32],
             height: 1234.567 + 0.37 * k as f32,
             target: 1200.0 + 1.7 * k as f32,
+            further: 1400.0 - 0.9 * k as f32,
             morph: k as f32 / 1999.0,
+            // Of neither, of the vertex, of both.
+            regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
         },
-        instance: Instance { origin: [5, 3], cells: 64, shift: (k % 2) as i32, turns: k % 4, ..Instance::default() },
+        instance: Instance {
+            origin: [5, 3],
+            cells: 64,
+            shift: (k % 2) as i32,
+            turns: k % 4,
+            weights: [k, k + 1, k + 2, k + 3].map(|n| n.wrapping_mul(0x9e37_79b1) & 0x7f7f_7f7f),
+            ..Instance::default()
+        },
         explicit_height: 1,
     });
     queries.extend(explicit);
@@ -76,7 +86,7 @@ fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
         let placed = placed(field, frame, &query.instance, vertex.position);
         return relative_position(frame, placed.at, placed.height);
     }
-    let height = morphed_height(vertex.height, vertex.target, vertex.morph);
+    let height = explicit_height(&query.instance, vertex);
     let turned = turned_position(&query.instance, vertex.position);
     relative_position(frame, lattice_position(frame, &query.instance, turned), height)
 }

@@ -49,6 +49,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
         size: [320, 200],
         near: 0.1,
         tolerance: Tolerance { px: 20.0 * random(seed) + 0.1, metric: Metric::Certified },
+        time_s: 0.0,
     };
     if random(seed) < 0.5 {
         return near;
@@ -179,8 +180,13 @@ fn no_weights_exceed_the_error() {
                     ..Instance::default()
                 };
                 let indices = mesh.ranges[0].clone();
-                let draws =
-                    vec![Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances: 0..1 }];
+                let draws = vec![Draw {
+                    source: Source::Lattice,
+                    topology: Topology::Triangles,
+                    indices,
+                    instances: 0..1,
+                    first_vertex: 0,
+                }];
                 let list = DrawList { draws, instances: vec![instance], ..DrawList::default() };
                 let drawn = heights(&field, &view, &mesh.geometry, &list);
                 let off = (0u32..).zip(&drawn).filter(|(_, y)| !y.is_nan());

@@ -3,6 +3,7 @@
 mod clusters;
 mod morph;
 mod skirts;
+mod smooth_tiles;
 mod strips;
 mod strips_order;
 

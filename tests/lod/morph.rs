@@ -26,6 +26,7 @@ fn view(eye: DVec3, target: DVec3, px: f64) -> View {
         size: [1280, 720],
         near: 1.0,
         tolerance: Tolerance { px, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 
@@ -42,6 +43,7 @@ fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph:
         topology: Topology::Triangles,
         indices: indices.clone(),
         instances: 0..1,
+        first_vertex: 0,
     });
     DrawList { draws: draws.into(), instances: vec![instance], ..DrawList::default() }
 }
@@ -127,5 +129,16 @@ fn clusters_do_not_jump_either() {
         let on = largest_jump(&field, "clusters", &[block, "morph=distance"]);
         println!("clusters, {block} by distance: {on:.3} px morphing");
         assert!(on < JUMP_PX, "{block}: {on} px morphing by distance");
+    }
+}
+
+#[test]
+fn nor_do_smooth_tiles() {
+    let field = land();
+    for clock in ["clock=speed", "clock=time", "clock=frames"] {
+        let [off, on] =
+            ["morph=off", "morph=on"].map(|morph| largest_jump(&field, "smooth-tiles", &["tile=17", morph, clock]));
+        println!("smooth tiles, {clock}: {off:.3} px at once, {on:.3} px morphing");
+        assert!(on < JUMP_PX && JUMP_PX < off, "{clock}: {on} px morphing, {off} px at once");
     }
 }

@@ -52,6 +52,7 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
         size: [64, 64],
         near: 1.0,
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
     };
     let frame = Frame::placing(&field, &view);
     let states = [[1, 2, 2, 1], [2, 1, 1, 2]];

@@ -113,6 +113,7 @@ fn nothing() -> View {
         size: [100, 100],
         near: 1.0,
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

@@ -90,7 +90,7 @@ fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> Met {
 
 fn view(eye: DVec3, rotation: glam::DMat3, lens: Lens) -> View {
     let tolerance = Tolerance { px: 0.7, metric: Metric::Certified };
-    View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance }
+    View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance, time_s: 0.0 }
 }
 
 fn land() -> Arc<Field> {

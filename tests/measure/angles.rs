@@ -24,6 +24,7 @@ fn largest(metric: Metric) -> [f64; ANGLES] {
             size: [1280, 720],
             near: 1.0,
             tolerance: Tolerance { px: 3.0, metric },
+            time_s: 0.0,
         };
         let list = select(&mut *technique, &view);
         let errors = geometric::errors(&field, &view, technique.resident(), &list);

@@ -29,6 +29,7 @@ fn scene() -> Scene {
         size: [1280, 720],
         near: 1.0,
         tolerance: Tolerance { px: 20.0, metric: Metric::Certified },
+        time_s: 0.0,
     };
     let mut technique = technique(&field, "geomipmap", &[("block", "17")]);
     let list = select(&mut *technique, &view);

@@ -33,6 +33,7 @@ fn poses() -> Option<Vec<View>> {
             size: [1280, 720],
             near: 0.1,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         }
     };
     let lines = text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit() || c == '-'));

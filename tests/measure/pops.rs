@@ -30,6 +30,7 @@ fn view(field: &Field, k: u32) -> View {
         size: [1280, 720],
         near: 1.0,
         tolerance: Tolerance { px: 4.0, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

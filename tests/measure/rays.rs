@@ -49,6 +49,7 @@ fn random_view(random: &mut Random) -> View {
         size: [640, 400],
         near: 1.0,
         tolerance: Tolerance { px: 5.0 + 60.0 * random.next(), metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

@@ -78,9 +78,15 @@ impl Path {
 
     /// The views of the whole path in `frames` steps.
     pub fn views(&self, field: &Field, frames: usize, size: [u32; 2], tolerance: Tolerance) -> Vec<View> {
-        let near = near(field);
-        self.poses(field, frames).iter().map(|pose| pose.view(size, near, tolerance)).collect()
+        views(&self.poses(field, frames), near(field), size, tolerance)
     }
+}
+
+/// A view a pose, the scene's time going on from frame to frame.
+pub fn views(poses: &[Pose], near: f64, size: [u32; 2], tolerance: Tolerance) -> Vec<View> {
+    let view =
+        |(k, pose): (u32, &Pose)| View { time_s: f64::from(k) * TIME_STEP_S, ..pose.view(size, near, tolerance) };
+    (0..).zip(poses).map(view).collect()
 }
 
 impl Pose {
@@ -100,6 +106,7 @@ impl Pose {
             size,
             near,
             tolerance,
+            time_s: 0.0,
         }
     }
 }

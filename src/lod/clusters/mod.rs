@@ -18,7 +18,7 @@
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
 //!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
 //! - with `morph=distance` every vertex has a weight by its own distance, so that edges agree by themselves; for that
-//!   the error is that of a whole level ([`ways`]), and finer levels reach farther than anywhere needed;
+//!   the error is that of a whole level (`ways`), and finer levels reach farther than anywhere needed;
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
 //! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
@@ -215,7 +215,13 @@ impl Clusters {
 
     fn push(&self, list: &mut DrawList, seed: usize, instances: std::ops::Range<u32>) {
         let indices = self.mesh.ranges[seed].clone();
-        list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+        list.draws.push(Draw {
+            source: Source::Lattice,
+            topology: Topology::Triangles,
+            indices,
+            instances,
+            first_vertex: 0,
+        });
     }
 }
 

@@ -362,6 +362,7 @@ mod tests {
                 px: 10f64.powf(4.0 * random(seed) - 2.0),
                 metric: if random(seed) < 0.7 { Metric::Certified } else { Metric::Paper },
             },
+            time_s: 0.0,
         }
     }
 

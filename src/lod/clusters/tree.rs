@@ -66,7 +66,7 @@ impl Node {
 pub enum Errors {
     /// Measured against the samples.
     Measured,
-    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ways`](super::ways)).
+    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ways`]).
     ByLevel(Vec<f32>),
     /// Judnich & Ling 2012, eq. 2: half the parent's; the root's is the range of heights, metres.
     Halved(f32),

@@ -51,7 +51,7 @@ impl Ways {
     /// The ways in a view of a quadtree whose errors are those of whole levels.
     pub fn new(tree: &Tree, view: &View) -> Self {
         let [low, high] = tree.bounds.square(tree.root().level, [0, 0]).range.map(f64::from);
-        let above = (view.eye.y - high).max(low - view.eye.y).max(0.0).min(FARTHEST_M);
+        let above = (view.eye.y - high).max(low - view.eye.y).clamp(0.0, FARTHEST_M);
         let diagonal = tree.spacing[0].hypot(tree.spacing[1]);
         let mut ways = [0.0; WAYS];
         let mut ended_m = 0.0f64;

@@ -223,7 +223,13 @@ fn push(list: &mut DrawList, indices: &std::ops::Range<u32>, instances: std::ops
         instance.batch = list.draws.len() as u32;
     }
     let indices = indices.clone();
-    list.draws.push(Draw { source: Source::Lattice, topology: Topology::Triangles, indices, instances });
+    list.draws.push(Draw {
+        source: Source::Lattice,
+        topology: Topology::Triangles,
+        indices,
+        instances,
+        first_vertex: 0,
+    });
 }
 
 impl Technique for GeoMipMap {

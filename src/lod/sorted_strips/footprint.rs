@@ -110,7 +110,8 @@ mod tests {
                 _ => Lens::Perspective { fov_x: 0.1 + 2.0 * random(&mut seed) },
             };
             let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
-            let view = View { eye, world_from_eye: rotation, lens, size: [320, 200], near: 0.1, tolerance };
+            let view =
+                View { eye, world_from_eye: rotation, lens, size: [320, 200], near: 0.1, tolerance, time_s: 0.0 };
             let mut touched = vec![false; (grid.count[0] * grid.count[1]) as usize];
             let range = [0.0, if k % 2 == 0 { 120.0 } else { 0.0 }];
             Footprint::new(&field, &view, range).visit_pages(&grid, |at| touched[grid.index(at).unwrap()] = true);

@@ -202,7 +202,7 @@ impl SortedStrips {
             list.instances.push(Instance { batch, ..Instance::default() });
             let indices = first..list.streamed.indices.len() as u32;
             let (source, topology) = (Source::Streamed, Topology::Triangles);
-            list.draws.push(Draw { source, topology, indices, instances: batch..batch + 1 });
+            list.draws.push(Draw { source, topology, indices, instances: batch..batch + 1, first_vertex: 0 });
         }
         if self.is_back_to_front {
             turn_round(list);

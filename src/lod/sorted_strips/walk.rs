@@ -173,7 +173,7 @@ impl<L: Levels> Ground<'_, L> {
     fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
         let [x, z] = position;
         let height = self.field.height(x as u32, z as u32);
-        let still = ExplicitVertex { position, height, target: height, morph: 0.0 };
+        let still = ExplicitVertex { position, height, target: height, ..ExplicitVertex::default() };
         let level = (x | z).trailing_zeros();
         if !self.blends || level >= self.pages.grid.level {
             return still;

@@ -16,7 +16,13 @@ fn slab([w, h]: [u32; 2]) -> (Field, DrawList) {
     list.instances.push(Instance::default());
     list.streamed.vertices = [[0, 0], [0, z], [x, 0], [x, z]].map(vertex).to_vec();
     list.streamed.indices = vec![0, 1, 2, 2, 1, 3];
-    list.draws.push(Draw { source: Source::Streamed, topology: Topology::Triangles, indices: 0..6, instances: 0..1 });
+    list.draws.push(Draw {
+        source: Source::Streamed,
+        topology: Topology::Triangles,
+        indices: 0..6,
+        instances: 0..1,
+        first_vertex: 0,
+    });
     (field, list)
 }
 
@@ -28,6 +34,7 @@ fn from_above(width: f64) -> View {
         size: [400, 300],
         near: 1.0,
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
     }
 }
 

@@ -193,6 +193,7 @@ mod tests {
             size: [100, 100],
             near: 1.0,
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
         };
         for at in [[1, 1], [16, 16], [7, 20], [32, 5], [11, 12], [0, 31]] {
             let field = spike(33, at);

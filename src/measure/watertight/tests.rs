@@ -24,6 +24,7 @@ fn above(x: f64, z: f64, width: f64) -> Frustum {
         size: [100, 100],
         near: 1.0,
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
     };
     view.frustum()
 }

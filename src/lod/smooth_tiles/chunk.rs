@@ -1,0 +1,223 @@
+//! What a tile keeps on the device at a level: each vertex with its height and where it goes.
+//!
+//! A vertex that the next level lacks goes to the middle of the edge of that level on which it lies (Larsen &
+//! Christensen, table 3); inside with the tile's weight, on a side with the side's. A side's weight goes on to the
+//! level after the next, for it may meet a tile that is on its way there: then the even vertices of the side go to the
+//! middle of that level's edges, and with them the targets of the vertices inside whose edges end there. So one chunk
+//! serves whatever the neighbours do, and where their levels change only indices do.
+
+use super::pattern;
+use crate::draw::ExplicitVertex;
+use crate::draw::weights::{self, Slot};
+use crate::height::Field;
+
+/// The place of a tile among the samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Its first sample.
+    pub origin: [i32; 2],
+    /// Cells along a side.
+    pub cells: i32,
+}
+
+/// One level of a tile.
+struct Level<'a> {
+    field: &'a Field,
+    place: Place,
+    level: u32,
+    /// Cells along a side at this level.
+    n: i32,
+}
+
+/// Vertices of a chunk of a level.
+pub fn vertices(cells: i32, level: u32) -> usize {
+    ((cells >> level) as usize + 1).pow(2)
+}
+
+/// The slot of a side's weight: that of its first half, both being the same.
+fn side_slot(side: usize) -> Slot {
+    (1 + side / 2, 2 * (side as u32 % 2))
+}
+
+/// The vertices of a tile at a level, row by row.
+pub fn build(field: &Field, place: Place, level: u32) -> Vec<ExplicitVertex> {
+    let tile = Level { field, place, level, n: place.cells >> level };
+    (0..=tile.n).flat_map(|z| (0..=tile.n).map(move |x| [x, z])).map(|at| tile.vertex(at)).collect()
+}
+
+impl Level<'_> {
+    fn vertex(&self, at: [i32; 2]) -> ExplicitVertex {
+        let height = self.height(at);
+        let still = ExplicitVertex {
+            position: at.map(|n| n << self.level),
+            height,
+            target: height,
+            further: height,
+            ..ExplicitVertex::default()
+        };
+        let moves = |target, further, regions| ExplicitVertex { target, further, regions, ..still };
+        if let Some(side) = pattern::side(self.n, at) {
+            let is_odd = at[1 - side % 2] & 1 == 1;
+            let target = if is_odd { self.middle(at, along(side, 1)) } else { self.side_target(at) };
+            return moves(target, target, weights::region(side_slot(side), u32::from(!is_odd)));
+        }
+        let apart = self.half_edge(at);
+        if apart == [0, 0] || !self.is_inside(at) {
+            return still;
+        }
+        let ends = [-1, 1].map(|sign| [0, 1].map(|k| at[k] + sign * apart[k]));
+        let side = ends.into_iter().find_map(|end| pattern::side(self.n, end));
+        let further = midpoint(self.side_target(ends[0]), self.side_target(ends[1]));
+        let second = side.map_or(0, |side| weights::region(side_slot(side), 1));
+        moves(self.middle(at, apart), further, weights::region(weights::inside(0), 0) | second << 8)
+    }
+
+    fn is_inside(&self, at: [i32; 2]) -> bool {
+        at.iter().all(|&n| n > 0 && n < self.n)
+    }
+
+    /// Where a vertex of the next level is when its side, if it lies on one, has gone on to the level after that.
+    fn side_target(&self, at: [i32; 2]) -> f32 {
+        match pattern::side(self.n, at) {
+            Some(side) if at[1 - side % 2] & 2 != 0 => self.middle(at, along(side, 2)),
+            _ => self.height(at),
+        }
+    }
+
+    /// From a vertex to one end of the edge of the next level in whose middle it lies; nothing if that level has it.
+    fn half_edge(&self, at: [i32; 2]) -> [i32; 2] {
+        let mut apart = at.map(|n| n & 1);
+        if apart == [1, 1] {
+            // The diagonal of the coarser cell: it turns with the parity of the cell's place in the whole field.
+            let cell = [0, 1].map(|k| (self.place.origin[k] + (at[k] << self.level)) >> (self.level + 1));
+            if (cell[0] + cell[1]) & 1 == 1 {
+                apart[1] = -1;
+            }
+        }
+        apart
+    }
+
+    fn middle(&self, at: [i32; 2], apart: [i32; 2]) -> f32 {
+        let [before, after] = [-1, 1].map(|sign| self.height([0, 1].map(|k| at[k] + sign * apart[k])));
+        midpoint(before, after)
+    }
+
+    /// The sample of a vertex; what sticks out of the field collapses onto its edge.
+    fn height(&self, at: [i32; 2]) -> f32 {
+        let size = self.field.size();
+        let [x, z] = [0, 1].map(|k| (self.place.origin[k] + (at[k] << self.level)).min(size[k] as i32 - 1));
+        self.field.height(x as u32, z as u32)
+    }
+}
+
+/// A step along a side.
+fn along(side: usize, step: i32) -> [i32; 2] {
+    if side.is_multiple_of(2) { [0, step] } else { [step, 0] }
+}
+
+fn midpoint(a: f32, b: f32) -> f32 {
+    (a + b) * 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::Instance;
+    use crate::draw::place::explicit_height;
+    use crate::draw::weights::ONE;
+    use crate::height::{Holes, Samples};
+
+    const CELLS: i32 = 16;
+
+    fn rough() -> Field {
+        let height = |k: u32| ((k.wrapping_mul(0x9e37_79b1) ^ (k << 7)).wrapping_mul(0x85eb_ca77) >> 8) as f32 / 1e5;
+        Field::new(Samples::F32((0..49 * 49).map(height).collect()), [49; 2], [1.0; 2], Holes::none(49 * 49))
+    }
+
+    /// A tile at a level, as it is drawn with weights inside and on the sides.
+    struct Shape {
+        n: i32,
+        heights: Vec<f32>,
+    }
+
+    impl Shape {
+        fn new(field: &Field, origin: [i32; 2], level: u32, inside: u32, sides: [u32; 4]) -> Self {
+            let chunk = build(field, Place { origin, cells: CELLS }, level);
+            assert_eq!(chunk.len(), vertices(CELLS, level));
+            let instance = Instance { weights: weights::uniform(inside, sides), ..Instance::default() };
+            Self { n: CELLS >> level, heights: chunk.iter().map(|vertex| explicit_height(&instance, vertex)).collect() }
+        }
+
+        fn at(&self, [x, z]: [i32; 2]) -> f32 {
+            self.heights[(z * (self.n + 1) + x) as usize]
+        }
+    }
+
+    /// The ends, in units of a coarser grid, of the edge of it in whose middle a vertex lies, by the rule of the RTIN
+    /// pattern alone.
+    fn ends(origin: [i32; 2], level: u32, [x, z]: [i32; 2]) -> [[i32; 2]; 2] {
+        let (i, j) = (x.div_euclid(2), z.div_euclid(2));
+        let place = origin.map(|n| n >> (level + 1));
+        match (x & 1, z & 1) {
+            (1, 1) if (place[0] + i + place[1] + j) & 1 == 0 => [[i, j], [i + 1, j + 1]],
+            (1, 1) => [[i, j + 1], [i + 1, j]],
+            (dx, dz) => [[i, j], [i + dx, j + dz]],
+        }
+    }
+
+    #[test]
+    fn a_morph_begins_as_the_finer_level_and_ends_as_the_coarser_one_to_the_bit() {
+        let field = rough();
+        let mut moved = 0;
+        for (origin, level) in [[0, 0], [16, 0], [16, 32]].into_iter().flat_map(|o| (0..4).map(move |l| (o, l))) {
+            let start = Shape::new(&field, origin, level, 0, [0; 4]);
+            let end = Shape::new(&field, origin, level, ONE, [ONE; 4]);
+            let next = Shape::new(&field, origin, level + 1, 0, [0; 4]);
+            for at in (0..=start.n).flat_map(|z| (0..=start.n).map(move |x| [x, z])) {
+                let [x, z] = [0, 1].map(|k| (origin[k] + (at[k] << level)) as u32);
+                assert_eq!(start.at(at).to_bits(), field.height(x, z).to_bits());
+                let [a, b] = ends(origin, level, at).map(|end| next.at(end));
+                assert_eq!(end.at(at).to_bits(), ((a + b) * 0.5).to_bits(), "level {level} of {origin:?} at {at:?}");
+                moved += u32::from(end.at(at) != start.at(at));
+            }
+        }
+        assert!(moved > 500, "{moved} vertices move");
+    }
+
+    #[test]
+    fn sides_on_their_way_to_the_level_after_the_next_take_the_inside_along() {
+        let (field, sides) = (rough(), [0, 17, 40, ONE]);
+        for (origin, level) in [[0, 0], [16, 32]].into_iter().flat_map(|o| (0..3).map(move |l| (o, l))) {
+            let end = Shape::new(&field, origin, level, ONE, sides.map(|e| ONE + e));
+            let next = Shape::new(&field, origin, level + 1, 0, sides);
+            for at in (0..=end.n).flat_map(|z| (0..=end.n).map(move |x| [x, z])) {
+                // Odd vertices of sides are not drawn.
+                if at[0] & 1 == 1 && at[1] % end.n == 0 || at[1] & 1 == 1 && at[0] % end.n == 0 {
+                    continue;
+                }
+                let [a, b] = ends(origin, level, at).map(|end| next.at(end));
+                let expected = (a + b) * 0.5;
+                let is_common = at[0] & 1 == 0 && at[1] & 1 == 0;
+                let apart = (end.at(at) - expected).abs();
+                assert!(if is_common { apart == 0.0 } else { apart <= 4e-5 }, "level {level} at {at:?}: {apart} m");
+            }
+        }
+    }
+
+    #[test]
+    fn two_tiles_agree_on_their_side_whatever_its_weight() {
+        let field = rough();
+        for (level, finer, weight) in
+            (1..4).flat_map(|l| [l, l - 1].into_iter().flat_map(move |f| [0, 1, 33, ONE].map(|w| (l, f, w))))
+        {
+            // West of x = 16 the level, east of it the same or one finer.
+            let west = Shape::new(&field, [0, 16], level, 21, [5, 9, weight, 3]);
+            let east = Shape::new(&field, [16, 16], finer, 50, [weight + (level - finer) * ONE, 7, 60, 0]);
+            let step = 1 << (level - finer);
+            for z in 0..=west.n {
+                let [a, b] = [west.at([west.n, z]), east.at([0, z * step])];
+                assert_eq!(a.to_bits(), b.to_bits(), "levels {level} and {finer}, weight {weight}, at {z}");
+            }
+        }
+    }
+}

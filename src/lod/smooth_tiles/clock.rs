@@ -1,0 +1,187 @@
+//! How far morphs go on from one frame to the next: with time, with frames, or with the way that the viewer goes
+//! (Larsen & Christensen, §2.3).
+
+use crate::view::{Lens, View};
+
+use super::levels;
+
+/// Seconds in which a level goes over into the next; as long as Hoppe's geomorphs (1998).
+const LEVEL_S: f64 = 1.0;
+
+/// Frames in which a level goes over into the next: half a second at 60 a second.
+const LEVEL_FRAMES: f64 = 30.0;
+
+/// Part of the way to a tile that the viewer goes while it goes over into its next level. A turn by a whole view is as
+/// much, and so is a picture twice as large or a tolerance half as wide: they change levels too.
+const LEVEL_WAY: f64 = 0.25;
+
+/// Levels, or ways in tiles, that are too little for a step are kept for the next one.
+const LEAST: f64 = 1.0 / 1024.0;
+
+/// What drives morphs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drive {
+    /// Nothing: levels change at once.
+    AtOnce,
+    /// The scene's time.
+    Time,
+    /// Frames.
+    Frames,
+    /// The viewer's way: the land is still while the viewer is.
+    Speed,
+}
+
+/// The clock of one land.
+pub struct Clock {
+    drive: Drive,
+    /// Side of a tile, metres.
+    side_m: f64,
+    last: Option<View>,
+    /// What was too little for a step.
+    rest: Step,
+}
+
+/// How far morphs go on in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Levels, everywhere.
+    pub levels: f64,
+    /// The viewer's way, metres: the nearer a tile, the more it is there.
+    pub way_m: f64,
+}
+
+impl Step {
+    const NONE: Step = Step { levels: 0.0, way_m: 0.0 };
+    const AT_ONCE: Step = Step { levels: f64::INFINITY, way_m: 0.0 };
+
+    /// In a tile so far from the eye, in units of [`levels::ONE`].
+    pub fn at(&self, distance_m: f64) -> u32 {
+        levels::fixed(self.levels + self.way_m / (LEVEL_WAY * distance_m))
+    }
+}
+
+impl Clock {
+    /// A clock that was never read. `side_m` is the length of a tile's side, metres.
+    pub fn new(drive: Drive, side_m: f64) -> Self {
+        Self { drive, side_m, last: None, rest: Step::NONE }
+    }
+
+    /// What drives it.
+    pub fn drive(&self) -> Drive {
+        self.drive
+    }
+
+    /// How far morphs go on in this view, after the one before it. At first levels are where they belong at once.
+    pub fn step(&mut self, view: &View) -> Step {
+        let Some(last) = self.last.replace(*view) else { return Step::AT_ONCE };
+        let Step { levels, way_m } = match self.drive {
+            Drive::AtOnce => Step::AT_ONCE,
+            Drive::Time => Step { levels: (view.time_s - last.time_s) / LEVEL_S, way_m: 0.0 },
+            Drive::Frames => Step { levels: 1.0 / LEVEL_FRAMES, way_m: 0.0 },
+            Drive::Speed => way(&last, view),
+        };
+        // Time that goes back, or is no number, moves nothing.
+        self.rest = Step { levels: self.rest.levels + levels.max(0.0), way_m: self.rest.way_m + way_m };
+        let released = |rest: &mut f64, least: f64| if *rest < least { 0.0 } else { std::mem::take(rest) };
+        let Step { levels, way_m } = &mut self.rest;
+        Step { levels: released(levels, LEAST), way_m: released(way_m, LEAST * self.side_m) }
+    }
+}
+
+/// The way between two views.
+fn way(from: &View, to: &View) -> Step {
+    // The chord: precise for small angles, which arc cosines are not.
+    let turned = [0, 1, 2].map(|k| from.world_from_eye.col(k).distance(to.world_from_eye.col(k)));
+    let turned = turned.into_iter().fold(0.0, f64::max) / breadth(to);
+    let scale = |view: &View| view.focal_px() / view.tolerance.px.max(f64::MIN_POSITIVE);
+    let scaled = (scale(to) / scale(from)).log2().abs();
+    let is_other = from.tolerance.metric != to.tolerance.metric
+        || std::mem::discriminant(&from.lens) != std::mem::discriminant(&to.lens);
+    let levels = if is_other { f64::INFINITY } else { turned + scaled };
+    Step { levels, way_m: from.eye.distance(to.eye) }
+}
+
+/// Angle that a view is wide, radians.
+fn breadth(view: &View) -> f64 {
+    match view.lens {
+        Lens::Perspective { fov_x } => fov_x.max(1e-3),
+        Lens::Orthographic { .. } => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::levels::ONE;
+    use super::*;
+    use crate::view::{Metric, Tolerance};
+    use glam::DVec3;
+
+    fn view(eye: DVec3, yaw: f64, time_s: f64) -> View {
+        View {
+            eye,
+            world_from_eye: View::turned(yaw, -10.0, 0.0),
+            lens: Lens::Perspective { fov_x: 1.0 },
+            size: [320, 200],
+            near: 0.1,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s,
+        }
+    }
+
+    fn clock(drive: Drive) -> Clock {
+        let mut clock = Clock::new(drive, 100.0);
+        assert_eq!(clock.step(&view(DVec3::ZERO, 0.0, 5.0)).at(1e9), u32::MAX, "at first, at once");
+        clock
+    }
+
+    /// In a tile 200 m away.
+    fn step(clock: &mut Clock, view: &View) -> u32 {
+        clock.step(view).at(200.0)
+    }
+
+    #[test]
+    fn time_that_stands_still_leaps_or_goes_back() {
+        let mut clock = clock(Drive::Time);
+        let mut at = |time_s| step(&mut clock, &view(DVec3::X * 1e9, 90.0, time_s));
+        assert_eq!(at(5.0), 0);
+        assert_eq!(at(5.0 + 0.25 * LEVEL_S), ONE / 4);
+        assert_eq!(at(3.0), 0, "back");
+        assert_eq!(at(1e300), u32::MAX, "a leap");
+        assert_eq!(at(f64::NAN), 0);
+        assert_eq!(at(7.0), 0);
+    }
+
+    #[test]
+    fn small_steps_add_up() {
+        let mut time = clock(Drive::Time);
+        let after = |k: u32| f64::from(k) / 3e6;
+        let sum: u32 = (1..=3_000_000).map(|k| step(&mut time, &view(DVec3::ZERO, 0.0, 5.0 + after(k)))).sum();
+        assert!(sum.abs_diff(ONE) < ONE / 50, "{sum} of {ONE}");
+        let mut way = clock(Drive::Speed);
+        let sum: u32 = (1..=3_000_000).map(|k| step(&mut way, &view(DVec3::Z * 50.0 * after(k), 0.0, 5.0))).sum();
+        assert!(sum.abs_diff(ONE) < ONE / 50, "{sum} of {ONE}");
+    }
+
+    #[test]
+    fn the_land_is_still_while_the_viewer_is() {
+        let mut clock = clock(Drive::Speed);
+        let mut at = |view: &View| step(&mut clock, view);
+        assert_eq!(at(&view(DVec3::ZERO, 0.0, 1e9)), 0);
+        assert_eq!(at(&view(DVec3::Z * 25.0, 0.0, 1e9)), ONE / 2);
+        let turned = at(&view(DVec3::Z * 25.0, 9.0, 1e9));
+        assert!(turned > ONE / 10 && turned < ONE / 4, "{turned}");
+        let nearer = View { lens: Lens::Perspective { fov_x: 0.2 }, ..view(DVec3::Z * 25.0, 9.0, 1e9) };
+        assert!(at(&nearer) > 2 * ONE);
+        let finer = View { tolerance: Tolerance { px: 0.5, metric: Metric::Certified }, ..nearer };
+        assert_eq!(at(&finer), ONE);
+        assert_eq!(at(&View { eye: DVec3::X * 1e12, ..finer }), u32::MAX, "a teleport");
+        assert_eq!(at(&View { lens: Lens::Orthographic { width: 9.0, far: 9.0 }, ..finer }), u32::MAX, "another lens");
+    }
+
+    #[test]
+    fn frames_are_counted_whatever_is_seen() {
+        let mut clock = clock(Drive::Frames);
+        let sum: u32 = (0..30).map(|_| step(&mut clock, &view(DVec3::ZERO, 0.0, 5.0))).sum();
+        assert!(sum.abs_diff(ONE) <= 30, "{sum}");
+    }
+}

@@ -1,0 +1,181 @@
+//! How far the shapes of a tile are from the samples.
+//!
+//! Between whole weights heights are affine in each weight that they depend on: the tile's own, and that of the one
+//! side that a triangle may touch. So the largest distances are at whole weights: a level as it is, its sides one level
+//! coarser; and on the way to the next level the inside arrived while the sides have not begun, or the sides two levels
+//! coarser while the inside has not begun. All other ends are a level as it is.
+
+use super::chunk::{self, Place};
+use super::pattern::{self, Triangle};
+use crate::draw::place::explicit_height;
+use crate::draw::weights::{self, ONE};
+use crate::draw::{ExplicitVertex, Instance};
+use crate::height::Field;
+use crate::height::surface::{self, Corner};
+
+/// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
+/// the two steps of `draw::place::explicit_height`.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// How much greater the error of a level of a tile that morphs is taken to be than that of the level before, at least:
+/// where two are alike, a tile would go through both at once.
+const GROWTH: f32 = 1.3;
+
+/// One tile while it is measured.
+pub struct Tile<'a> {
+    field: &'a Field,
+    place: Place,
+}
+
+impl<'a> Tile<'a> {
+    /// The tile at a place.
+    pub fn new(field: &'a Field, place: Place) -> Self {
+        Self { field, place }
+    }
+
+    fn last(&self) -> [i32; 2] {
+        let size = self.field.size();
+        [0, 1].map(|k| (self.place.origin[k] + self.place.cells).min(size[k] as i32 - 1))
+    }
+
+    /// Whether it sticks out of the field. Such a tile does not morph inside: the field's edge is no vertex of the
+    /// next level.
+    pub fn is_partial(&self) -> bool {
+        (0..2).any(|k| self.place.origin[k] + self.place.cells > self.last()[k])
+    }
+
+    /// Range of heights, metres; `None` if no triangle of the finest level has data.
+    pub fn range_of_land(&self) -> Option<[f32; 2]> {
+        surface::has_land(self.field, self.place.origin, self.last()).then(|| self.range())
+    }
+
+    fn range(&self) -> [f32; 2] {
+        let ([x0, z0], [x1, z1]) = (self.place.origin, self.last());
+        let heights = (z0..=z1).flat_map(|z| (x0..=x1).map(move |x| self.field.height(x as u32, z as u32)));
+        heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)])
+    }
+
+    /// ε by level, metres, rising: true for all that is drawn at the level and, if tiles morph, on the way to it. 0 at
+    /// level 0, where only a coarser side is off the samples, which the tile beyond it answers for.
+    pub fn errors(&self, morphs: bool) -> Vec<f32> {
+        let mut largest = 0.0f32;
+        let levels = 0..=self.place.cells.ilog2();
+        let [low, high] = self.range();
+        let rounding = if morphs { low.abs().max(high.abs()) * ROUNDING } else { 0.0 };
+        let mut errors = Vec::new();
+        let mut way = 0.0;
+        for level in levels {
+            let chunk = chunk::build(self.field, self.place, level);
+            let own = if level == 0 { 0.0 } else { self.level_error(&chunk, level) };
+            largest = if morphs { largest * GROWTH } else { largest }.max(own).max(way);
+            // Where nothing is off the samples nothing moves.
+            errors.push(if largest > 0.0 { largest + rounding } else { 0.0 });
+            way = if morphs { self.way_error(&chunk, level) } else { 0.0 };
+        }
+        errors
+    }
+
+    fn n(&self, level: u32) -> i32 {
+        self.place.cells >> level
+    }
+
+    /// The error of a level, its sides coarser or not.
+    fn level_error(&self, chunk: &[ExplicitVertex], level: u32) -> f32 {
+        let n = self.n(level);
+        let still = if n == 1 { self.single() } else { [pattern::centre(n), pattern::border(n, 0)].concat() };
+        let stitched = if n == 1 { Vec::new() } else { pattern::border(n, 15) };
+        self.error(chunk, n, [0, 0], &still).max(self.error(chunk, n, [0, ONE], &stitched))
+    }
+
+    /// The error of what is new on the way to the next level.
+    fn way_error(&self, chunk: &[ExplicitVertex], level: u32) -> f32 {
+        let n = self.n(level);
+        let arrived = if n == 1 || self.is_partial() { Vec::new() } else { pattern::border(n, 0) };
+        // No level is two levels coarser than that of two cells.
+        let behind = if n <= 2 { Vec::new() } else { pattern::border(n, 15) };
+        self.error(chunk, n, [ONE, 0], &arrived).max(self.error(chunk, n, [0, 2 * ONE], &behind))
+    }
+
+    /// The triangles of a tile of a single cell.
+    fn single(&self) -> Vec<Triangle> {
+        let odd = ((self.place.origin[0] + self.place.origin[1]) / self.place.cells) & 1;
+        crate::height::rtin::cell(odd, 0).map(|triangle| triangle.map(|[x, z]| [x - odd, z])).into()
+    }
+
+    /// The largest distance of triangles, weighted inside and on all sides, from the samples.
+    fn error(&self, chunk: &[ExplicitVertex], n: i32, [inside, side]: [u32; 2], triangles: &[Triangle]) -> f32 {
+        let instance = Instance { weights: weights::uniform(inside, [side; 4]), ..Instance::default() };
+        let size = self.field.size();
+        let corner = |[x, z]: [i32; 2]| {
+            let vertex = &chunk[(z * (n + 1) + x) as usize];
+            let [x, z] = [0, 1].map(|k| (self.place.origin[k] + vertex.position[k]).min(size[k] as i32 - 1));
+            Corner { x, z, y: explicit_height(&instance, vertex) }
+        };
+        let corners = triangles.iter().map(|triangle| triangle.map(corner));
+        let real = corners.filter(|corners| surface::doubled_area(corners) != 0);
+        real.map(|corners| surface::deviation(self.field, &corners)).fold(0.0, f32::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    const CELLS: i32 = 16;
+
+    /// 2 × 2 tiles, rough only near a column of samples, or near one sample.
+    fn rough_near(x: u32, z: Option<u32>, random: &mut impl FnMut() -> f32) -> Field {
+        let size = 2 * CELLS as u32 + 1;
+        let near = |k: u32| (k % size).abs_diff(x) < 3 && z.is_none_or(|z| (k / size).abs_diff(z) < 3);
+        let heights = (0..size * size).map(|k| if near(k) { 100.0 * random() } else { 0.0 });
+        Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
+    }
+
+    /// The bound of the way from one level to the next, at any weights inside and on the sides, and how often it is
+    /// needed beyond what levels are off when they are still.
+    #[test]
+    fn no_weights_on_the_way_exceed_what_the_ceiling_counts_on() {
+        let mut seed = 3u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        let (mut beyond_still, mut closest) = (0, 0.0f32);
+        for k in 0..132 {
+            let z = (k >= 66).then_some(14 + k / 7 % 5);
+            let field = rough_near(k % 33, z, &mut random);
+            let tile = Tile::new(&field, Place { origin: [k / 2 % 2, k % 2].map(|n| n as i32 * CELLS), cells: CELLS });
+            let (errors, still) = (tile.errors(true), tile.errors(false));
+            for (level, draw) in (0..4u32).flat_map(|level| (0..40).map(move |draw| (level, draw))) {
+                let mut weight = |most: f32| if draw < 20 { most * random() } else { (most * random()).round() };
+                let inside = weight(1.0);
+                // Sides are at most one level beyond the inside.
+                let side = weight(if level == 3 { 1.0 } else { 1.0 + inside });
+                let (n, is_coarser) = (CELLS >> level, side >= 1.0);
+                let triangles = [pattern::border(n, if is_coarser { 15 } else { 0 }), pattern::centre(n)].concat();
+                let chunk = chunk::build(&field, tile.place, level);
+                let weights = [inside, side].map(|w| (w * ONE as f32) as u32);
+                let error = tile.error(&chunk, n, weights, &triangles);
+                let own = if level == 0 && side > 0.0 {
+                    tile.error(&chunk, n, [0, ONE], &pattern::border(n, 15))
+                } else {
+                    0.0
+                };
+                let [own, next] = [own.max(errors[level as usize]), errors[level as usize + 1]];
+                let left = (1.0 - inside) * (1.0 - inside);
+                let bound = left * own + (1.0 - left) * next.max(own);
+                assert!(
+                    error <= bound * 1.0001,
+                    "level {level}, {inside} inside, sides {side}: {error} m of {bound} m"
+                );
+                beyond_still += usize::from(error > still[level as usize + 1]);
+                closest = closest.max(error / bound.max(f32::MIN_POSITIVE));
+            }
+        }
+        assert!(
+            beyond_still > 0 && closest > 0.99,
+            "{beyond_still} beyond what levels are off, {closest} of the bound"
+        );
+    }
+}

@@ -1,0 +1,313 @@
+//! Smooth tiles: chunks of geometry in device memory, morphed by the vertex program.
+//!
+//! After B. D. Larsen and N. J. Christensen, "Real-time Terrain Rendering using Smooth Hardware Optimized Level of
+//! Detail" (2003): tiles of 2^w + 1 vertices, the leaves of a quadtree, have levels by de Boer's metric. Each keeps a
+//! chunk of vertices on the device, with their places at the next level, and goes over into it gradually. A chunk is
+//! rebuilt when its tile changes level, a few in a frame.
+//!
+//! Where this differs from the paper, and why:
+//! - the levels of tiles are continuous numbers. A side has the greater one of its two tiles, which is what table 4
+//!   says: that of two equal tiles which coarsens takes the side along, that which refines does not; the coarser one
+//!   refining does, the finer one coarsening does not. Any number of neighbours may change in one frame;
+//! - the *finer* tile's border is modified, as in the figures (§2.2 says the other one's);
+//! - a tile has one chunk, not one and four borders: vertices of a side also know the level after the next, and where a
+//!   neighbour's level changes the border has other indices. Nothing is rebuilt for a neighbour;
+//! - with the metric `certified` a morph gives way to the bound whatever the clock says, and it begins only where the
+//!   next level keeps the bound. Only where a refinement waits for its chunk may the bound be exceeded: the list says
+//!   in how many tiles;
+//! - a tile that sticks out of the field does not morph inside: the field's edge is no vertex of the next level.
+//!
+//! Laws kept: watertight and within one level of each other in every frame, in mid-morph too; covered once; error
+//! within tolerance once nothing waits; the same list for the same view once it has settled.
+
+pub mod chunk;
+pub mod clock;
+pub mod levels;
+mod measure;
+pub mod pattern;
+pub mod pool;
+pub mod queue;
+pub mod tiles;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use self::clock::{Clock, Drive};
+use self::levels::ONE;
+use self::pattern::Patterns;
+use self::queue::{Budget, Queue};
+use self::tiles::Tiles;
+use super::{Entry, Setting, Settings, Technique, Values};
+use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology, Upload, weights};
+use crate::height::Field;
+use crate::view::View;
+
+/// The most bytes uploaded in a frame: a staging buffer of this size is made for each frame in flight.
+const UPLOAD_BYTES: usize = 64 << 20;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "smooth-tiles",
+    about: "tiles of chunks in device memory, each going over into its next level",
+    paper: "Larsen & Christensen 2003",
+    variants: &[],
+    settings: &[
+        Setting {
+            key: "tile",
+            values: Values::Words(&["9", "17", "33", "65"]),
+            default: "33",
+            about: "vertices along a side of a tile",
+        },
+        Setting {
+            key: "morph",
+            values: Values::Words(&["on", "off"]),
+            default: "on",
+            about: "whether a level goes over into the next, or changes at once",
+        },
+        Setting {
+            key: "clock",
+            values: Values::Words(&["speed", "time", "frames"]),
+            default: "speed",
+            about: "what drives morphs: the viewer's way, the scene's time, or frames",
+        },
+        Setting {
+            key: "rebuild",
+            values: Values::Number(1.0, 100_000.0),
+            default: "100000",
+            about: "chunks rebuilt in a frame at most (the paper: 1), and no more than 64 MiB hold",
+        },
+        Setting {
+            key: "memory",
+            values: Values::Number(1.0, 65536.0),
+            default: "512",
+            about: "chunks on the device at most, MiB",
+        },
+    ],
+    build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
+};
+
+/// Names of the figures of table 2: triangles that a tile has less than at level 0.
+const REDUCTIONS: [&str; 6] = [
+    "reduction at level 1",
+    "reduction at level 2",
+    "reduction at level 3",
+    "reduction at level 4",
+    "reduction at level 5",
+    "reduction at level 6",
+];
+
+struct SmoothTiles {
+    field: Arc<Field>,
+    tiles: Tiles,
+    patterns: Patterns,
+    resident: Geometry,
+    queue: Queue,
+    clock: Clock,
+    budget: Budget,
+    morphs: bool,
+    /// Side of a tile, metres.
+    side_m: f64,
+    /// Level of each tile as it is drawn, in units of [`ONE`].
+    levels: Vec<u32>,
+    /// The most that each tile's bound allows, alone and beside its neighbours.
+    ceilings: [Vec<u32>; 2],
+    /// Whole levels that tiles are to stand on.
+    aims: Vec<u32>,
+    visible: Vec<usize>,
+    is_visible: Vec<bool>,
+}
+
+impl SmoothTiles {
+    fn new(field: Arc<Field>, settings: &Settings) -> Self {
+        let cells = settings.number("tile") as i32 - 1;
+        let drive = match (settings.word("morph"), settings.word("clock")) {
+            ("off", _) => Drive::AtOnce,
+            (_, "time") => Drive::Time,
+            (_, "frames") => Drive::Frames,
+            _ => Drive::Speed,
+        };
+        let morphs = drive != Drive::AtOnce;
+        let tiles = Tiles::new(&field, cells, morphs);
+        let vertex = size_of::<ExplicitVertex>();
+        let queue = Queue::new(&tiles, (settings.number("memory") * 1048576.0) as usize / vertex);
+        let chunks = settings.number("rebuild") as usize;
+        let vertices = queue.vertices().min(UPLOAD_BYTES / vertex);
+        let patterns = Patterns::new(cells);
+        let side_m = f64::from(cells) * field.spacing[0].max(field.spacing[1]);
+        let (top, count) = (tiles.levels - 1, tiles.total());
+        let mut room = Self {
+            resident: Geometry {
+                vertices: vec![ExplicitVertex::default(); queue.vertices()],
+                indices: patterns.indices.clone(),
+                ..Geometry::default()
+            },
+            clock: Clock::new(drive, side_m),
+            budget: Budget { chunks, vertices: vertices.min(chunks.saturating_mul(chunk::vertices(cells, 0))) },
+            morphs,
+            side_m,
+            levels: vec![top * ONE; count],
+            ceilings: [Vec::new(), Vec::new()],
+            aims: Vec::new(),
+            visible: Vec::new(),
+            is_visible: vec![false; count],
+            field,
+            tiles,
+            patterns,
+            queue,
+        };
+        room.build_coarsest(top);
+        room
+    }
+
+    fn build_coarsest(&mut self, top: u32) {
+        for tile in 0..self.tiles.total() {
+            let vertices = chunk::build(&self.field, self.tiles.place(tile), top);
+            self.write(self.queue.first_vertices[tile], &vertices);
+        }
+    }
+
+    fn write(&mut self, first_vertex: u32, vertices: &[ExplicitVertex]) {
+        let first = first_vertex as usize;
+        self.resident.vertices[first..first + vertices.len()].copy_from_slice(vertices);
+    }
+
+    /// How coarse each tile may be in a view.
+    fn find_ceilings(&mut self, view: &View) {
+        let [own, restricted] = &mut self.ceilings;
+        let allowance = view.allowance();
+        let ceiling = if self.morphs { levels::ceiling } else { levels::whole_ceiling };
+        let allowed = |tile: usize| allowance.error(&self.tiles.bounds(tile));
+        own.clear();
+        own.extend((0..self.tiles.total()).map(|tile| ceiling(self.tiles.errors(tile), allowed(tile))));
+        restricted.clone_from(own);
+        levels::restrict(restricted, self.tiles.count);
+    }
+
+    /// Moves levels on, as far as the clock and the bound say.
+    fn move_levels(&mut self, view: &View) {
+        let step = self.clock.step(view);
+        let ceilings = &self.ceilings[1];
+        for (tile, level) in self.levels.iter_mut().enumerate() {
+            let distance_m = self.tiles.bounds(tile).distance(view.eye).max(self.side_m);
+            *level = levels::moved(*level, ceilings[tile], step.at(distance_m));
+        }
+        // Steps differ from tile to tile.
+        levels::restrict(&mut self.levels, self.tiles.count);
+        self.aims.clear();
+        self.aims.extend(self.levels.iter().map(|level| level / ONE));
+    }
+
+    fn find_visible(&mut self, view: &View) {
+        let (visible, is_visible) = (&mut self.visible, &mut self.is_visible);
+        visible.iter().for_each(|&tile| is_visible[tile] = false);
+        visible.clear();
+        self.tiles.visit_visible(&view.frustum(), &mut |tile| visible.push(tile));
+        visible.iter().for_each(|&tile| is_visible[tile] = true);
+    }
+
+    /// Rebuilds what changes its level, as far as the frame's budget goes.
+    fn rebuild(&mut self, view: &View, uploads: &mut Vec<Upload>) {
+        let (tiles, is_visible) = (&self.tiles, &self.is_visible);
+        let urgency = |tile: usize| (!is_visible[tile], tiles.bounds(tile).distance(view.eye));
+        let moves = self.queue.advance(tiles, &self.aims, self.budget, urgency).to_vec();
+        let build = |moved: &queue::Move| chunk::build(&self.field, tiles.place(moved.tile), moved.level);
+        let chunks: Vec<_> = moves.par_iter().map(build).collect();
+        for (moved, vertices) in moves.iter().zip(chunks) {
+            self.write(moved.first_vertex, &vertices);
+            uploads.push(Upload::Vertices(moved.first_vertex, vertices));
+        }
+    }
+
+    /// Draws of a tile: its centre, and the border for its neighbours.
+    fn push(&self, tile: usize, list: &mut DrawList) {
+        let (level, batch) = (self.queue.levels[tile], list.instances.len() as u32);
+        let place = self.tiles.place(tile);
+        let (mask, weights) = self.border(tile);
+        let (origin, cells) = (place.origin, place.cells as u32);
+        list.instances.push(Instance { origin, cells, level, batch, weights, ..Instance::default() });
+        let border = self.patterns.border(level, mask, self.tiles.is_odd(tile));
+        for indices in [self.patterns.centres[level as usize].clone(), border] {
+            if !indices.is_empty() {
+                let (source, topology) = (Source::Resident, Topology::Triangles);
+                let first_vertex = self.queue.first_vertices[tile];
+                list.draws.push(Draw { source, topology, indices, instances: batch..batch + 1, first_vertex });
+            }
+        }
+    }
+
+    /// Which sides meet coarser tiles, and how far the tile's inside and its sides have gone.
+    fn border(&self, tile: usize) -> (usize, [u32; 4]) {
+        let base = self.queue.levels[tile];
+        let is_partial = self.tiles.is_partial(tile);
+        let weight = |level: u32| (level - base * ONE) / (ONE / weights::ONE);
+        let mut mask = 0;
+        let mut sides = [0; 4];
+        for (side, other) in self.tiles.neighbours(tile).into_iter().enumerate() {
+            let other = other.unwrap_or(tile);
+            let coarser = self.queue.levels[other].max(base);
+            mask |= usize::from(coarser > base) << side;
+            // Between tiles that stick out the middles of edges are none.
+            let stays = is_partial && self.tiles.is_partial(other);
+            sides[side] = weight(if stays { coarser * ONE } else { self.levels[tile].max(self.levels[other]) });
+        }
+        let inside = if is_partial { 0 } else { weight(self.levels[tile]) };
+        (mask, weights::uniform(inside, sides))
+    }
+}
+
+impl Technique for SmoothTiles {
+    fn resident(&self) -> &Geometry {
+        &self.resident
+    }
+
+    fn limits(&self) -> Limits {
+        let count = self.tiles.total();
+        let upload_bytes = self.budget.vertices * size_of::<ExplicitVertex>();
+        Limits { draws: 2 * count, instances: count, upload_bytes, ..Limits::default() }
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.find_ceilings(view);
+        self.move_levels(view);
+        self.find_visible(view);
+        self.rebuild(view, &mut list.uploads);
+        // What waits stays on its chunk: fully the next level, or fully its own.
+        for (level, &standing) in self.levels.iter_mut().zip(&self.queue.levels) {
+            *level = (*level).clamp(standing * ONE, (standing + 1) * ONE);
+        }
+        let waits = |&&tile: &&usize| self.levels[tile] > self.ceilings[0][tile];
+        list.waiting = self.visible.iter().filter(waits).count();
+        self.visible.iter().for_each(|&tile| self.push(tile, list));
+    }
+
+    fn is_settled(&self) -> bool {
+        // The viewer's way is over where the view stays the same.
+        let is_still = self.clock.drive() == Drive::Speed;
+        let stands = |tile: usize| {
+            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
+            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
+        };
+        self.queue.is_at_rest() && (is_still || (0..self.tiles.total()).all(stands))
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        let bytes = |count: usize| (count * size_of::<ExplicitVertex>()) as f64;
+        let whole = [
+            ("tiles", self.tiles.total() as f64, ""),
+            ("chunks in use", self.queue.chunks() as f64, ""),
+            ("vertex bytes on the device", bytes(self.queue.vertices()), "B"),
+            ("vertex bytes in use", bytes(self.queue.used_vertices()), "B"),
+            ("index bytes", size_of_val(self.patterns.indices.as_slice()) as f64, "B"),
+        ];
+        let reduction = |(level, name): (u32, &'static str)| {
+            let share = f64::from(self.patterns.triangles(level)) / f64::from(self.patterns.triangles(0));
+            (name, 100.0 * (1.0 - share), "%")
+        };
+        whole.into_iter().chain((1..self.tiles.levels).zip(REDUCTIONS).map(reduction)).collect()
+    }
+}

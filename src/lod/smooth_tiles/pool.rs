@@ -1,0 +1,152 @@
+//! Where chunks lie in the one vertex buffer: pages of equal size, each cut into slots for chunks of one level while
+//! any of them is in use. What is freed serves any level again once its page is empty.
+
+/// The slots of a buffer.
+pub struct Pool {
+    /// Vertices of a page.
+    page: usize,
+    /// Vertices of a slot, by level.
+    sizes: Vec<usize>,
+    pages: Vec<Page>,
+    /// Pages of no level.
+    empty: Vec<u32>,
+    /// Pages of a level with a free slot, by level.
+    open: Vec<Vec<u32>>,
+}
+
+struct Page {
+    level: u32,
+    /// Slots in use.
+    held: usize,
+    /// Free slots.
+    free: Vec<u32>,
+}
+
+/// Chunks of the finest level in a page: the more, the less of it is left over at other levels.
+const CHUNKS: usize = 4;
+
+impl Pool {
+    /// For chunks of these sizes by level, the greatest first: as many pages as hold `vertices` vertices.
+    pub fn new(sizes: Vec<usize>, vertices: usize) -> Self {
+        let page = CHUNKS * sizes[0];
+        let count = vertices.div_ceil(page) as u32;
+        let pages = (0..count).map(|_| Page { level: 0, held: 0, free: Vec::new() }).collect();
+        let open = vec![Vec::new(); sizes.len()];
+        Self { page, sizes, pages, empty: (0..count).rev().collect(), open }
+    }
+
+    /// Vertices of all pages.
+    pub fn vertices(&self) -> usize {
+        self.pages.len() * self.page
+    }
+
+    /// Vertices of all pages that are in use.
+    pub fn used_vertices(&self) -> usize {
+        (self.pages.len() - self.empty.len()) * self.page
+    }
+
+    /// Chunks in use.
+    pub fn held(&self) -> usize {
+        self.pages.iter().map(|page| page.held).sum()
+    }
+
+    /// Slots of a level in a page.
+    fn slots(&self, level: u32) -> usize {
+        self.page / self.sizes[level as usize]
+    }
+
+    /// Vertices of pages that hold so many chunks of each level, and one page of each level more: what was freed may
+    /// leave that much in pieces.
+    pub fn vertices_for(sizes: &[usize], chunks: &[usize]) -> usize {
+        let page = CHUNKS * sizes[0];
+        sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
+    }
+
+    /// The first vertex of a free slot for a chunk of a level, if pages are left: of the empty ones `spare` are not
+    /// touched.
+    pub fn take(&mut self, level: u32, spare: usize) -> Option<u32> {
+        if self.open[level as usize].is_empty() {
+            if self.empty.len() <= spare {
+                return None;
+            }
+            let page = self.empty.pop()?;
+            let slots = self.slots(level) as u32;
+            self.pages[page as usize] = Page { level, held: 0, free: (0..slots).rev().collect() };
+            self.open[level as usize].push(page);
+        }
+        let page = *self.open[level as usize].last()?;
+        let Page { ref mut held, ref mut free, .. } = self.pages[page as usize];
+        let slot = free.pop()?;
+        *held += 1;
+        if free.is_empty() {
+            self.open[level as usize].pop();
+        }
+        Some(page * self.page as u32 + slot * self.sizes[level as usize] as u32)
+    }
+
+    /// Gives back what [`Self::take`] gave.
+    pub fn give(&mut self, first_vertex: u32) {
+        let page = first_vertex / self.page as u32;
+        let Page { level, ref mut held, ref mut free } = self.pages[page as usize];
+        *held -= 1;
+        free.push(first_vertex % self.page as u32 / self.sizes[level as usize] as u32);
+        let (held, left) = (*held, free.len());
+        let open = &mut self.open[level as usize];
+        if left == 1 {
+            open.push(page);
+        }
+        if held == 0 {
+            self.open[level as usize].retain(|other| *other != page);
+            self.empty.push(page);
+        }
+    }
+
+    /// Whether so many chunks of each level can be taken now, whatever is given back meanwhile.
+    pub fn holds(&self, chunks: &[usize], spare: usize) -> bool {
+        let pages = |level: usize| {
+            let open: usize = self.open[level].iter().map(|page| self.pages[*page as usize].free.len()).sum();
+            chunks[level].saturating_sub(open).div_ceil(self.slots(level as u32))
+        };
+        (0..chunks.len()).map(pages).sum::<usize>() + spare <= self.empty.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_chunks_share_a_vertex_and_nothing_leaks() {
+        let sizes = vec![81, 25, 9, 4];
+        let mut pool = Pool::new(sizes.clone(), 20 * 324);
+        let (mut held, mut seed, mut refused): (Vec<(u32, u32)>, u32, u32) = (Vec::new(), 1, 0);
+        for _ in 0..20_000 {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            let (choice, at) = (seed >> 24, (seed >> 8) as usize);
+            // In turns it fills up and is emptied.
+            if choice.is_multiple_of(3) != (held.len() > 40 && at.is_multiple_of(2)) || held.is_empty() {
+                match pool.take(choice % 4, 0) {
+                    Some(first) => held.push((first, choice % 4)),
+                    None => refused += 1,
+                }
+            } else {
+                pool.give(held.swap_remove(at % held.len()).0);
+            }
+            let mut sorted = held.clone();
+            sorted.sort_unstable();
+            let apart = |pair: &[(u32, u32)]| pair[0].0 + sizes[pair[0].1 as usize] as u32 <= pair[1].0;
+            assert!(sorted.windows(2).all(apart), "chunks overlap");
+            assert!(sorted.last().is_none_or(|&(first, k)| first as usize + sizes[k as usize] <= pool.vertices()));
+        }
+        assert_eq!(pool.held(), held.len());
+        while pool.take(0, 0).is_some() {}
+        assert!(pool.take(0, 0).is_none() && !pool.holds(&[1, 0, 0, 0], 0), "it is full");
+        let mut pool = Pool::new(sizes, 20 * 324);
+        let all: Vec<u32> = std::iter::from_fn(|| pool.take(1, 3)).collect();
+        assert_eq!((all.len(), pool.used_vertices()), (17 * 12, 17 * 324), "all but the spare pages");
+        assert!(pool.holds(&[12, 0, 0, 0], 0) && !pool.holds(&[13, 0, 0, 0], 0) && pool.holds(&[4, 1, 0, 0], 1));
+        all.into_iter().for_each(|first| pool.give(first));
+        assert_eq!(pool.used_vertices(), 0);
+        println!("{refused} refused");
+    }
+}

@@ -1,0 +1,129 @@
+//! A soak: random flights, teleports and switches of technique, for as many seconds as `CUESTA_SOAK_S` says or for a
+//! short while. Nothing leaks on the device, no chunk is lost, no list exceeds its limits, no validation message comes;
+//! and run alone (with `CUESTA_SOAK_S`), the process stays as large as it was after its first fifth.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use cuesta::gpu::Gpu;
+use cuesta::height::{Field, synth};
+use cuesta::lod::{TECHNIQUES, Technique};
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::{Copy, Scene};
+use cuesta::view::{Lens, View};
+use glam::DVec3;
+
+use super::{aslant, on_device, technique};
+
+/// Seconds if nobody says how many.
+const SECONDS: u64 = 20;
+
+/// Frames with one technique.
+const FRAMES: u32 = 60;
+
+/// What the process may grow by after the first fifth: allocators keep pieces.
+const GROWTH_BYTES: u64 = 64 << 20;
+
+struct Random(u64);
+
+impl Random {
+    fn number(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn one_of<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+        &of[(self.number() * of.len() as f64) as usize]
+    }
+}
+
+/// Every technique and variant as it is, and chunks that are short of time or of memory.
+fn forms() -> Vec<(String, Vec<&'static str>)> {
+    let of = |entry: &'static cuesta::lod::Entry| {
+        let variants = entry.variants.iter().map(|variant| format!("{}:{}", entry.name, variant.name));
+        std::iter::once(entry.name.to_string()).chain(variants)
+    };
+    let plain = TECHNIQUES.iter().flat_map(of).map(|name| (name, Vec::new()));
+    let short = [vec!["tile=9", "rebuild=1"], vec!["tile=17", "memory=1"], vec!["tile=9", "clock=frames"]];
+    plain.chain(short.map(|settings| ("smooth-tiles".to_string(), settings))).collect()
+}
+
+/// The next view: a step and a turn, the same once more, or somewhere else.
+fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
+    let [w, h] = field.size().map(f64::from);
+    let step = DVec3::new(random.number() - 0.5, random.number() - 0.5, random.number() - 0.5) * 60.0;
+    let time_s = view.time_s + *random.one_of(&[0.0, 1.0 / 60.0, 1.0 / 60.0, 5.0]);
+    let turned = View::turned(360.0 * random.number(), -60.0 * random.number(), 0.0);
+    match (random.number() * 10.0) as u32 {
+        0 => View { time_s, ..*view },
+        1 => View { world_from_eye: turned, time_s, ..*view },
+        2 => {
+            let eye = field.world_at(w * random.number(), h * random.number(), 900.0 * random.number());
+            let lens = Lens::Perspective { fov_x: 0.1 + 2.0 * random.number() };
+            View { eye, world_from_eye: turned, lens, time_s, ..*start }
+        }
+        _ => View { eye: view.eye + step, time_s, ..*view },
+    }
+}
+
+/// One flight with one technique; bytes on the device while it lasts.
+fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: &str, random: &mut Random) -> u64 {
+    let look = Look::default();
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
+    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
+    let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
+    let start = aslant(field, [160, 100], *random.one_of(&[1.0, 2.0, 8.0]));
+    let mut stage = scene.stage(technique, start.size).unwrap();
+    let made = gpu.device_bytes().values().sum();
+    let mut view = start;
+    for frame in 0..FRAMES {
+        stage.draw(technique, &view, Copy::Nothing).unwrap();
+        let (size, limits) = (stage.list.size(), technique.limits());
+        assert!(limits.hold(&size), "{name}, frame {frame}: {size:?} exceeds {limits:?}");
+        let figure = |name: &str| technique.figures().into_iter().find(|f| f.0 == name).map(|f| f.1);
+        assert_eq!(figure("chunks in use"), figure("tiles"), "{name}, frame {frame}: a chunk a tile");
+        view = next(field, &start, &view, random);
+    }
+    assert_eq!(gpu.device_bytes().values().sum::<u64>(), made, "{name}: nothing is made inside a frame");
+    made
+}
+
+/// What the process holds now, bytes.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().trim_end_matches(" kB").parse::<u64>().ok().map(|kilobytes| kilobytes << 10)
+}
+
+#[test]
+fn nothing_leaks_however_long_it_flies() {
+    let asked: Option<u64> = std::env::var("CUESTA_SOAK_S").ok().map(|s| s.parse().expect("CUESTA_SOAK_S: seconds"));
+    let lasts = Duration::from_secs(asked.unwrap_or(SECONDS));
+    on_device(|gpu| {
+        let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 321], 3));
+        let (random, forms) = (&mut Random(0x50a4), forms());
+        let bytes = || gpu.device_bytes().values().sum::<u64>();
+        let (started, empty) = (Instant::now(), bytes());
+        let (mut flights, mut warm, mut most) = (0, 0, 0);
+        while started.elapsed() < lasts || flights < forms.len() {
+            // Each once, then any.
+            let (name, settings) =
+                forms.get(flights).unwrap_or_else(|| &forms[(random.number() * forms.len() as f64) as usize]);
+            let mut technique = technique(&field, name, settings);
+            assert!(fly(gpu, &field, technique.as_mut(), name, random) > empty, "{name}: it has something to leak");
+            drop(technique);
+            assert_eq!(bytes(), empty, "{name} {settings:?}: bytes left on the device");
+            let messages = gpu.instance.messages.lock().unwrap().join("\n");
+            assert!(messages.is_empty(), "{name} {settings:?}: {messages}");
+            flights += 1;
+            let now = resident_bytes().unwrap_or(0);
+            most = most.max(now);
+            if started.elapsed() < lasts / 5 || flights <= forms.len() {
+                warm = most;
+            }
+        }
+        println!("{flights} flights, the process {} MiB after a fifth, {} MiB at most", warm >> 20, most >> 20);
+        // Other tests of this process have memory of their own.
+        assert!(asked.is_none() || most <= warm + GROWTH_BYTES, "{warm} B after a fifth, then {most} B");
+    });
+}
