@@ -1,5 +1,6 @@
 //! What single techniques promise beyond the laws of `conformance`.
 
+mod budget;
 mod clusters;
 mod morph;
 mod skirts;
