@@ -28,7 +28,15 @@ impl Target {
         }
     }
 
-    /// Standard deviation of ln cost from frame to frame when nothing changes.
+    /// Width of a stair that is not worth closing in on further, ln τ: what noise hides takes too many frames to find.
+    fn finest(self) -> f64 {
+        match self {
+            Target::Triangles(_) => 1e-5,
+            Target::FrameMs(_) => 1e-2,
+        }
+    }
+
+    /// Standard deviation of ln cost from frame to frame when nothing changes, until it is known better.
     fn noise(self) -> f64 {
         match self {
             Target::Triangles(_) => 0.005,
@@ -37,10 +45,21 @@ impl Target {
     }
 }
 
+/// Tolerances that make sense on any screen, pixels.
+pub const RANGE_PX: [f64; 2] = [1.0 / 64.0, 256.0];
+
 /// How much more than the target a move to a finer level may cost, ln cost.
 const OVERSHOOT: f64 = 0.18;
 /// How far the level wanders from frame to frame, ln cost.
 const WANDER: f64 = 0.03;
+/// After so many steps from one side only, what holds them back on the other side is forgotten.
+const DISTRUST: i32 = 5;
+/// Tolerances closer than this are the same, ln τ.
+const SAME: f64 = 1e-7;
+/// Share of a new frame in the noise that is known.
+const NOISE_SHARE: f64 = 0.05;
+/// Times are never more exact than this, ln cost.
+const LEAST_NOISE: f64 = 0.02;
 /// Deviations that a likely value is within.
 const LIKELY: f64 = 3.0;
 /// Deviations that the slope of a move to a finer level is within.
@@ -54,8 +73,6 @@ const SLOPE_DEVIATION: f64 = 3.0;
 const SLOPES: [f64; 2] = [-2e4, -0.25];
 /// The longest moves at once towards finer and coarser levels, ln τ.
 const LONGEST: [f64; 2] = [-6.0, 1.4];
-/// A change of τ that no technique notices, ln τ: stairs are closed in on up to here.
-const FINEST: f64 = 1e-5;
 /// Costs below this are taken for it: their logarithms are finite.
 const LEAST_COST: f64 = 1e-3;
 
@@ -63,6 +80,8 @@ const LEAST_COST: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct Controller {
     target: Target,
+    /// Standard deviation of ln cost from frame to frame when nothing changes.
+    noise: f64,
     /// ln τ, least and most.
     range: [f64; 2],
     /// ln τ of the next frame.
@@ -74,6 +93,8 @@ pub struct Controller {
     dear: Option<[f64; 2]>,
     /// The smallest ln τ that is cheap enough, and the same (negative).
     cheap: Option<[f64; 2]>,
+    /// How often in a row only what is cheap enough came closer (positive) or what is too dear (negative).
+    one_sided: i32,
     /// Whether the last cost was off the line and left more than half of the way between them.
     is_slow: bool,
 }
@@ -89,7 +110,18 @@ impl Controller {
         assert!(range_px[0] <= range_px[1], "an empty range of tolerances");
         let range = range_px.map(f64::ln);
         let next = first_px.ln().clamp(range[0], range[1]);
-        Self { target, range, next, model: None, suspect: None, dear: None, cheap: None, is_slow: false }
+        Self {
+            target,
+            noise: target.noise(),
+            range,
+            next,
+            model: None,
+            suspect: None,
+            dear: None,
+            cheap: None,
+            one_sided: 0,
+            is_slow: false,
+        }
     }
 
     /// What is held.
@@ -109,7 +141,7 @@ impl Controller {
         if !at.is_finite() || !excess.is_finite() {
             return;
         }
-        let noise = self.target.noise();
+        let noise = self.noise;
         let Some(model) = &mut self.model else {
             self.model = Some(Model::new(at, excess, noise));
             return self.decide(false);
@@ -120,8 +152,14 @@ impl Controller {
         let is_bent = surprise.abs() > LIKELY && model.is_elsewhere(at, noise, is_on_stair);
         if surprise.abs() <= LIKELY {
             let was_at = model.at;
+            let off = excess - model.moved(at).level;
             let error = model.update(at, excess, noise);
-            self.age(if at == was_at { [error; 2] } else { [-WANDER, WANDER] });
+            let is_same = at == was_at;
+            self.age(if is_same { [error; 2] } else { [-WANDER, WANDER] });
+            if is_same && matches!(self.target, Target::FrameMs(_)) {
+                let variance = noise * noise + NOISE_SHARE * (off * off - noise * noise);
+                self.noise = variance.sqrt().clamp(LEAST_NOISE, self.target.noise());
+            }
         } else if is_bent {
             model.bend(at, excess, noise);
         } else if self.suspect.is_some_and(|suspect| suspect * surprise > 0.0) {
@@ -147,7 +185,7 @@ impl Controller {
         self.narrow(&model, is_bent);
         // A tolerance that is likely right stays.
         let held = model.moved(self.next);
-        if held.level.abs() <= held.dead_band() && self.within(self.next) == self.next {
+        if held.level.abs() <= model.dead_band() && self.within(self.next) == self.next {
             return;
         }
         let aim = self.within(model.at + model.step().clamp(LONGEST[0], LONGEST[1]));
@@ -160,11 +198,19 @@ impl Controller {
         let sure = LIKELY * model.dead_band();
         let width = self.width();
         if level > sure && self.dear.is_none_or(|dear| dear[0] <= at) {
+            self.one_sided = closer(self.one_sided.min(0), self.dear, at, -1);
             self.dear = Some([at, level]);
             self.cheap = self.cheap.filter(|cheap| cheap[0] > at);
         } else if level < -sure && self.cheap.is_none_or(|cheap| cheap[0] >= at) {
+            self.one_sided = closer(self.one_sided.max(0), self.cheap, at, 1);
             self.cheap = Some([at, level]);
             self.dear = self.dear.filter(|dear| dear[0] < at);
+        }
+        // What was seen long ago at the other side holds no more: the load has changed while τ moved.
+        if self.one_sided >= DISTRUST {
+            (self.dear, self.one_sided) = (None, 0);
+        } else if self.one_sided <= -DISTRUST {
+            (self.cheap, self.one_sided) = (None, 0);
         }
         let left = self.width();
         self.is_slow = is_bent && width.is_finite() && left > 0.5 * width;
@@ -181,13 +227,18 @@ impl Controller {
             let (least, most) = (self.dear.map_or(aim, |dear| dear[0]), self.cheap.map_or(aim, |cheap| cheap[0]));
             return aim.max(least).min(most);
         };
-        if cheap - dear <= FINEST {
+        if cheap - dear <= self.target.finest() {
             return cheap;
         }
         // Where lines do not help, halves do.
         let [least, most] = if self.is_slow { [0.5, 0.5] } else { [0.02, 0.98] };
         aim.clamp(dear + least * (cheap - dear), dear + most * (cheap - dear))
     }
+}
+
+/// One more than `before` if a bound moves.
+fn closer(before: i32, bound: Option<[f64; 2]>, at: f64, sign: i32) -> i32 {
+    if bound.is_some_and(|bound| (bound[0] - at).abs() <= SAME) { before } else { before + sign }
 }
 
 /// ln cost over the target's, near a tolerance: a line, and how well it is known.
@@ -241,7 +292,7 @@ impl Model {
     /// Whether a tolerance differs so much that the curve may be another one there, on a stair very little.
     fn is_elsewhere(&self, at: f64, noise: f64, is_on_stair: bool) -> bool {
         let step = (at - self.at).abs();
-        step > 0.05 + noise || self.slope.abs() * step > 0.02 + 2.0 * noise || is_on_stair && step > 0.01 * FINEST
+        step > 0.05 + noise || self.slope.abs() * step > 0.02 + 2.0 * noise || is_on_stair && step > SAME
     }
 
     /// Takes a cost at another tolerance that the line does not explain: the curve is bent.

@@ -127,7 +127,7 @@ fn with_noise_of_thirty_percent_the_expected_cost_is_held() {
             let (overshoots, settlings) = (spread(overshoots), spread(settlings));
             println!("slope {slope}, delay {delay}, {name}: overshoot {overshoots:.2?}, settled in {settlings:?}");
             let what = format!("slope {slope}, delay {delay}, {name}");
-            assert!(overshoots[0] <= 0.2 && overshoots[1] <= 0.35, "{what}: overshoot {overshoots:?}");
+            assert!(overshoots[0] <= 0.2 && overshoots[1] <= 0.4, "{what}: overshoot {overshoots:?}");
             assert!(settlings[0] <= 15.0 && settlings[1] <= 25.0, "{what}: settled in {settlings:?}");
         }
     }
@@ -230,5 +230,19 @@ fn slow_changes_are_followed() {
             let limit = if name == "ramp" { 0.03 } else { 0.055 } * (delay as f64 + 1.0);
             assert!(worst <= limit, "delay {delay}, {name}: {worst}");
         }
+    }
+}
+
+/// A load that falls while τ moves leaves what was too dear at finer levels behind: it must not hold τ back.
+#[test]
+fn slow_first_frames_do_not_hold_it_back() {
+    let curve = |px: f64| 0.36 * COST + 2.3 * COST / (1.0 + px);
+    for delay in [1, 2, 3] {
+        let factor = |k: usize| if k < 3 { 10.0 } else { 1.0 };
+        let load = Load { curve: &curve, factor: &factor, delay, noise: 0.04, seed: 3 };
+        let frames = load.fly(Target::FrameMs(COST), 0.5, 120);
+        let settled = settling(&frames[3..], 0.1);
+        println!("delay {delay}: settled in {settled} frames");
+        assert!(settled <= 60, "delay {delay}: {settled}");
     }
 }
