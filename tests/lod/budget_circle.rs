@@ -14,7 +14,7 @@ use super::technique;
 /// Triangles to hold.
 const TARGETS: [f64; 3] = [4e4, 8e4, 16e4];
 /// Of a thousand frames, those that are flown.
-const FLOWN: usize = 250;
+const FLOWN: usize = 100;
 /// Frames in which the controller settles.
 const SETTLING: usize = 15;
 
