@@ -10,7 +10,7 @@ mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
-mod kept;
+pub(crate) mod kept;
 pub mod levels;
 mod load;
 mod png;

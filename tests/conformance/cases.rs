@@ -1,5 +1,6 @@
 //! Fields, forms of techniques and views that the laws are tried on.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,27 +16,48 @@ pub struct Form {
     pub settings: Settings,
 }
 
-/// Every combination of an entry's settings, and each variant with the default ones and with each single one: a
-/// variant changes how a list is submitted.
+/// Settings of an entry so that any two values of any two settings meet in one of them, and each variant with the
+/// default ones and with each single one: a variant changes how a list is submitted.
 pub fn forms(entry: &'static Entry) -> Vec<Form> {
-    let mut choices: Vec<Vec<(String, String)>> = vec![Vec::new()];
-    for setting in entry.settings {
-        let with = |chosen: &Vec<(String, String)>| {
-            let chosen = chosen.clone();
-            values(setting)
-                .into_iter()
-                .map(move |value| [chosen.clone(), vec![(setting.key.to_string(), value)]].concat())
-        };
-        choices = choices.iter().flat_map(with).collect();
-    }
-    let whole = choices.iter().map(|choice| form(entry, None, choice));
-    let single = entry
-        .settings
-        .iter()
-        .flat_map(|setting| values(setting).into_iter().map(|value| vec![(setting.key.to_string(), value)]));
+    let whole = pairwise(entry.settings);
+    let whole = whole.iter().map(|choice| form(entry, None, choice));
+    let single = entry.settings.iter().flat_map(|setting| choices(setting).into_iter().map(|choice| vec![choice]));
     let single: Vec<_> = std::iter::once(Vec::new()).chain(single).collect();
     let of_variant = |variant: &'static Variant| single.iter().map(|choice| form(entry, Some(variant.name), choice));
     whole.chain(entry.variants.iter().flat_map(of_variant)).collect()
+}
+
+/// Few combinations of settings in which all pairs of their values occur: each next one is that of all with the most
+/// pairs that were in none before.
+fn pairwise(settings: &[Setting]) -> Vec<Vec<(String, String)>> {
+    let mut all: Vec<Vec<(String, String)>> = vec![Vec::new()];
+    for setting in settings {
+        let with = |chosen: &Vec<_>| {
+            let chosen = chosen.clone();
+            choices(setting).into_iter().map(move |choice| [chosen.clone(), vec![choice]].concat())
+        };
+        all = all.iter().flat_map(with).collect();
+    }
+    let pairs = |row: &[(String, String)]| {
+        let pair = |k: usize| (0..=k).map(move |l| (k, l));
+        let all = (0..row.len()).flat_map(pair).map(|(k, l)| [row[k].clone(), row[l].clone()]);
+        all.collect::<HashSet<_>>()
+    };
+    let (mut rows, mut met) = (Vec::new(), HashSet::new());
+    while let Some(row) = all.iter().rev().max_by_key(|row| pairs(row).difference(&met).count()) {
+        let found = pairs(row);
+        if !rows.is_empty() && found.is_subset(&met) {
+            break;
+        }
+        met.extend(found);
+        rows.push(row.clone());
+    }
+    rows
+}
+
+/// A setting's key with each value that it is tried at.
+fn choices(setting: &Setting) -> Vec<(String, String)> {
+    values(setting).into_iter().map(|value| (setting.key.to_string(), value)).collect()
 }
 
 /// The values that a setting is tried at: every word, and for a number one far below its default, since a length
@@ -204,6 +226,23 @@ pub fn sees_everything(field: &Field, view: &View) -> bool {
         max: field.world_at(w, h, range.max.into()),
     };
     view.frustum().contains(&bounds) == Containment::Inside
+}
+
+/// The pairs counted here the plain way.
+#[test]
+fn any_two_values_of_two_settings_meet() {
+    for entry in cuesta::lod::TECHNIQUES {
+        let rows = pairwise(entry.settings);
+        let product: usize = entry.settings.iter().map(|setting| values(setting).len()).product();
+        println!("{}: {} of {product} combinations", entry.name, rows.len());
+        assert!(rows.len() <= product && rows.iter().all(|row| row.len() == entry.settings.len()));
+        let all: Vec<_> = entry.settings.iter().flat_map(choices).collect();
+        for (one, other) in all.iter().flat_map(|one| all.iter().map(move |other| (one, other))) {
+            let may_meet = one == other || one.0 != other.0;
+            let meet = rows.iter().any(|row| row.contains(one) && row.contains(other));
+            assert_eq!(meet, may_meet, "{}: {one:?} and {other:?}", entry.name);
+        }
+    }
 }
 
 #[test]
