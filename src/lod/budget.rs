@@ -6,7 +6,7 @@
 //!
 //! - nothing is integrated: there is no wind-up where τ ends, and waiting for a late cost repeats no correction;
 //! - what noise explains moves nothing: the dead band is what is unknown of the level;
-//! - towards finer levels τ goes as far only as the steepest likely slope allows without [`OVERSHOOT`];
+//! - towards finer levels τ goes as far only as the steepest likely slope allows without costing a fifth too much;
 //! - a cost that nothing explains is believed when the next one agrees: a single slow frame moves nothing;
 //! - where cost is a staircase, the nearest tolerances known to be too dear and cheap enough close in on the stair,
 //!   and the cheap one stays.
