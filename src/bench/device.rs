@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 
+use super::held::Helm;
 use super::paths::TIME_STEP_S;
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
@@ -101,10 +102,13 @@ impl Laboratory for DeviceLaboratory {
     fn time(&mut self, scene: &Scene) -> Result<Timed> {
         let (mut technique, mut stage) = self.set(scene)?;
         let has_clock = self.gpu.timestamp_ns > 0.0;
+        let mut helm = Helm::new(scene.case);
         let draw = |view: &View| -> Result<Frame> {
+            let view = &helm.view(view);
             let times = stage.draw(technique.as_mut(), view, Copy::Nothing)?;
             let floor = stage.draw_floor(view, Copy::Nothing)?;
             let list = &stage.list;
+            helm.learn(view, list.triangles(), times.frame_ms);
             Ok(Frame {
                 frame_ms: times.frame_ms,
                 select_ms: times.select_ms,
@@ -118,6 +122,7 @@ impl Laboratory for DeviceLaboratory {
                 commands: list.commands() as u64,
                 widening: list.widening,
                 waiting: list.waiting as u64,
+                tolerance_px: view.tolerance.px,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
@@ -129,20 +134,22 @@ impl Laboratory for DeviceLaboratory {
         let (mut technique, mut stage) = self.set(scene)?;
         let mut pool = Pool::default();
         let mut before: Option<(View, Geometry, DrawList)> = None;
-        for (frame, view) in scene.views.iter().enumerate() {
+        let mut helm = Helm::new(scene.case);
+        for (frame, pose) in scene.views.iter().enumerate() {
+            let view = &helm.view(pose);
             let is_measured = frame % scene.case.every == 0;
             let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
             stage.time_s = frame as f64 * TIME_STEP_S;
             let times = stage.draw(technique.as_mut(), view, copy)?;
             stage.complete()?;
+            helm.learn(view, stage.list.triangles(), times.frame_ms);
             if is_measured {
                 let truth = self.truth(scene, frame)?;
                 let fragments = times.gpu.statistics.map(|[.., fragments]| fragments);
-                look(scene, frame, technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
-                if let Some((view, resident, list)) = &before {
-                    let old = pop::State { view, resident, list };
-                    let new =
-                        pop::State { view: &scene.views[frame], resident: technique.resident(), list: &stage.list };
+                look(scene, (frame, view), technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
+                if let Some((from, resident, list)) = &before {
+                    let old = pop::State { view: from, resident, list };
+                    let new = pop::State { view, resident: technique.resident(), list: &stage.list };
                     pool.pop(&pop::pop(scene.field, old, new));
                 }
             }
@@ -165,14 +172,14 @@ fn decision(of_plan: plan::Decision) -> Decision {
 /// Measures one frame.
 fn look(
     scene: &Scene,
-    frame: usize,
+    (frame, view): (usize, &View),
     technique: &dyn Technique,
     stage: &mut Stage,
     truth: &Truth,
     fragments: Option<u64>,
     pool: &mut Pool,
 ) -> Result<()> {
-    let (view, field, resident) = (&scene.views[frame], scene.field, technique.resident());
+    let (field, resident) = (scene.field, technique.resident());
     let picture = stage.picture();
     if stage.list.triangles() <= CAPTURED && stage.captures() {
         let placing = layout::Frame::placing(field, view);

@@ -4,6 +4,7 @@
 pub mod compare;
 #[cfg(feature = "vulkan")]
 pub mod device;
+pub mod held;
 pub mod journal;
 pub mod kit;
 pub mod machine;

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::held::Held;
 use super::journal;
 use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, extended, kept};
 use super::statistics::{Estimate, middle};
@@ -82,6 +83,9 @@ pub struct TimeSummary {
     /// kept.
     #[serde(with = "extended", default = "kept")]
     pub widening: f64,
+    /// How well the goal was held, if there is one.
+    #[serde(default)]
+    pub held: Option<Held>,
     /// Device bytes, all purposes together.
     pub device_bytes: u64,
 }
@@ -136,8 +140,10 @@ fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult 
 /// The base case of a case's scene: that of the same tolerance and settings where there is one.
 fn base_of<'a>(of: &CaseResult, cases: &'a [CaseResult], base: &str) -> Option<&'a CaseResult> {
     let of = &of.case;
-    let unlike =
-        |case: &Case| (case.tolerance_px != of.tolerance_px, case.metric != of.metric, case.settings != of.settings);
+    let unlike = |case: &Case| {
+        let is_other = (case.tolerance_px != of.tolerance_px, case.metric != of.metric, case.settings != of.settings);
+        (case.goal != of.goal, is_other)
+    };
     let all = cases.iter().filter(|result| result.case.technique == base && result.case.scene() == of.scene());
     all.min_by_key(|result| unlike(&result.case))
 }
@@ -177,6 +183,7 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         draws: over(|r| r.draws.mean),
         commands: over(|r| r.commands.mean),
         widening: rounds.iter().map(|r| r.widening).fold(1.0, f64::max),
+        held: Held::median(&rounds.iter().filter_map(|r| r.held).collect::<Vec<_>>()),
         device_bytes: rounds.iter().map(|r| r.device_bytes.values().sum()).max().unwrap_or(0),
     })
 }

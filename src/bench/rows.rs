@@ -6,6 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::held::{Goal, Held};
 use super::statistics::{Percentiles, Spread};
 
 /// Version of rows and results. It grows when a reader of the old ones would misread the new ones.
@@ -99,8 +100,11 @@ pub struct Case {
     pub technique: String,
     /// Settings put over the technique's defaults.
     pub settings: BTreeMap<String, String>,
-    /// Error allowed, pixels.
+    /// Error allowed, pixels; where there is a goal, at the start.
     pub tolerance_px: f64,
+    /// What every frame is to cost, by moving the tolerance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<Goal>,
     /// `certified` or `paper`.
     pub metric: String,
     /// Name of the path.
@@ -178,6 +182,12 @@ pub struct Times {
     /// Frames with such instances.
     #[serde(default)]
     pub waiting_frames: usize,
+    /// How well the goal was held, if there is one.
+    #[serde(default)]
+    pub held: Option<Held>,
+    /// The tolerances of the frames, pixels, if there is a goal.
+    #[serde(default)]
+    pub tolerances_px: Vec<f64>,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
     /// The most memory that the process has held, bytes.
@@ -391,7 +401,8 @@ impl Case {
     pub fn series(&self) -> String {
         let settings: Vec<_> = self.settings.iter().map(|(key, value)| format!(" {key}={value}")).collect();
         let metric = if self.metric == "certified" { "" } else { " (paper metric)" };
-        format!("{}{}{metric}", self.technique, settings.concat())
+        let goal = self.goal.map_or(String::new(), |goal| format!(" held at {goal}"));
+        format!("{}{}{metric}{goal}", self.technique, settings.concat())
     }
 
     /// What is looked at: cases of one scene differ in how it is drawn only.

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, ensure};
 
+use super::held::{Goal, Held};
 use super::journal::Journal;
 use super::machine::host_bytes;
 use super::paths::{self, Pose};
@@ -27,7 +28,7 @@ pub struct Scene<'a> {
     pub case: &'a Case,
     /// The field.
     pub field: &'a Arc<Field>,
-    /// A view a frame, in order.
+    /// A view a frame, in order, under the case's tolerance; a goal moves it ([`Helm`](super::held::Helm)).
     pub views: &'a [View],
     /// The folder for pictures: file names in [`Errors`] are relative to it.
     pub folder: &'a Path,
@@ -60,6 +61,8 @@ pub struct Frame {
     pub widening: f64,
     /// Instances in sight whose refinement waited.
     pub waiting: u64,
+    /// Error allowed, pixels.
+    pub tolerance_px: f64,
 }
 
 /// What drawing a scene once took.
@@ -188,7 +191,7 @@ impl Run<'_> {
         let (found, expected) = (timed.frames.len(), views.len());
         ensure!(found == expected, "{found} frames were timed of {expected}");
         timed.frames.drain(..self.warm_up);
-        Ok(Row::Time(TimeRow { case: case.clone(), times: Times::of(round, timed) }))
+        Ok(Row::Time(TimeRow { case: case.clone(), times: Times::of(round, timed, case.goal) }))
     }
 }
 
@@ -235,7 +238,7 @@ fn whole_us(ms: f64) -> f64 {
 
 impl Times {
     /// Sums one round's frames up.
-    pub fn of(round: usize, timed: Timed) -> Self {
+    pub fn of(round: usize, timed: Timed, goal: Option<Goal>) -> Self {
         let frames = &timed.frames;
         let times = |of: fn(&Frame) -> f64| Percentiles::of(frames.iter().map(of));
         let measured = |of: fn(&Frame) -> Option<f64>| -> Option<Percentiles> {
@@ -262,6 +265,8 @@ impl Times {
             widening: frames.iter().map(|frame| frame.widening).fold(1.0, f64::max),
             waiting: frames.iter().map(|frame| frame.waiting).max().unwrap_or(0),
             waiting_frames: frames.iter().filter(|frame| frame.waiting > 0).count(),
+            held: goal.map(|goal| Held::of(goal, frames)),
+            tolerances_px: frames.iter().filter(|_| goal.is_some()).map(|frame| frame.tolerance_px).collect(),
             device_bytes: timed.device_bytes,
             host_bytes: host_bytes(),
         }

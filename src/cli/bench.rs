@@ -72,6 +72,12 @@ pub struct MeasureArgs {
     /// Errors allowed, pixels.
     #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
     pub tolerance: Vec<f64>,
+    /// Triangles a frame to hold by moving the tolerance, which starts as the first one given; each is measured.
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    pub triangles: Vec<f64>,
+    /// Milliseconds a frame to hold in the same way.
+    #[arg(long, value_name = "MS,…", value_delimiter = ',')]
+    pub frame_time: Vec<f64>,
     /// Paths to fly; the kit has its own.
     #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = super::cases::path_help())]
     pub path: Vec<String>,

@@ -9,6 +9,7 @@ use clap::ValueEnum;
 
 use super::bench::MeasureArgs;
 use super::{Common, report};
+use crate::bench::held::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
 use crate::lod::{self, Settings};
@@ -74,6 +75,9 @@ impl Planned {
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
         let asked = techniques(args)?;
         ensure!(args.tolerance.iter().all(|px| px.is_finite() && *px > 0.0), "--tolerance: expected positive pixels");
+        for (flag, costs) in [("--triangles", &args.triangles), ("--frame-time", &args.frame_time)] {
+            ensure!(costs.iter().all(|cost| cost.is_finite() && *cost > 0.0), "{flag}: expected positive numbers");
+        }
         let (mut fields, mut flights) = (Vec::new(), Vec::new());
         if args.kit {
             of_kit(common, &args.only, &mut fields, &mut flights)?;
@@ -195,18 +199,24 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
         Choice::Paper => &["paper"],
         Choice::Both => &["certified", "paper"],
     };
+    let goals = goals(args);
     let mut cases = Vec::new();
     for (metric, asked) in metrics.iter().flat_map(|metric| asked.iter().map(move |asked| (metric, asked))) {
         let is_truth = asked.technique == TRUTH;
-        let tolerances = if is_truth { &args.tolerance[..1] } else { &args.tolerance[..] };
+        // What is held starts from the first tolerance.
+        let is_one = is_truth || !goals.is_empty();
+        let tolerances = if is_one { &args.tolerance[..1] } else { &args.tolerance[..] };
+        let goals: Vec<_> = if is_one && !is_truth { goals.iter().copied().map(Some).collect() } else { vec![None] };
         if is_truth && *metric != metrics[0] {
             continue;
         }
-        cases.extend(tolerances.iter().map(|&tolerance_px| Case {
+        let choices = tolerances.iter().flat_map(|&px| goals.iter().map(move |&goal| (px, goal)));
+        cases.extend(choices.map(|(tolerance_px, goal)| Case {
             terrain: flight.terrain.clone(),
             technique: asked.technique.clone(),
             settings: asked.settings.clone(),
             tolerance_px,
+            goal,
             metric: metric.to_string(),
             path: flight.path.to_string(),
             size: flight.size,
@@ -215,6 +225,12 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
         }));
     }
     cases
+}
+
+/// What is to be held, if anything.
+fn goals(args: &MeasureArgs) -> Vec<Goal> {
+    let triangles = args.triangles.iter().map(|&count| Goal::Triangles(count));
+    triangles.chain(args.frame_time.iter().map(|&ms| Goal::FrameMs(ms))).collect()
 }
 
 /// The choices of a run, whatever order and form they were given in.
@@ -229,6 +245,7 @@ fn arguments(args: &MeasureArgs) -> Vec<String> {
     if !settings.is_empty() {
         list.push(format!("--set {}", joined(&settings)));
     }
+    list.extend(goals(args).iter().map(|goal| format!("held at {goal}")));
     list.extend(args.ground.detail.then(|| "--detail".to_string()));
     if args.ground.sun_speed != 0.0 {
         list.push(format!("--sun-speed {}", args.ground.sun_speed));

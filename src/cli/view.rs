@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, render, report};
+use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;
 use crate::viewer::{self, Setup};
 
@@ -29,6 +30,12 @@ pub struct ViewerArgs {
     /// Whether frames wait for the display.
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub vsync: Switch,
+    /// Hold this many triangles a frame by moving the tolerance.
+    #[arg(long, value_name = "N", conflicts_with = "frame_time")]
+    pub triangles: Option<f64>,
+    /// Hold this many milliseconds a frame in the same way; frames do not wait for the display then.
+    #[arg(long, value_name = "MS")]
+    pub frame_time: Option<f64>,
     /// Close the window after this many seconds.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
@@ -58,6 +65,15 @@ pub fn has_display() -> bool {
     !cfg!(all(unix, not(target_os = "macos"))) || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
 }
 
+/// What a frame is to cost.
+fn target(args: &ViewerArgs) -> Result<Option<Target>> {
+    let target = args.triangles.map(Target::Triangles).or(args.frame_time.map(Target::FrameMs));
+    if target.is_some_and(|target| !(target.cost().is_finite() && target.cost() > 0.0)) {
+        bail!("--triangles, --frame-time: expected a positive number");
+    }
+    Ok(target)
+}
+
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     if !has_display() {
@@ -66,6 +82,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     if args.seconds.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
         bail!("--seconds: expected a number of seconds");
     }
+    let target = target(args)?;
     let field = Arc::new(args.terrain.load(common)?.field);
     let (look, overlay) = args.look.build(&args.terrain.terrain)?;
     let summary = viewer::run(&Setup {
@@ -79,7 +96,8 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         look,
         choice: render::choice(common),
         validate: common.validate,
-        vsync: args.vsync == Switch::On,
+        target,
+        vsync: args.vsync == Switch::On && args.frame_time.is_none(),
         seconds: args.seconds,
         save: render::save,
     })?;

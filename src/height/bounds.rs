@@ -18,7 +18,7 @@ use super::{Field, cuts, surface};
 pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// Fields with fewer stored samples are measured in a moment: nothing is kept.
-const KEPT_FROM: u64 = 1 << 23;
+pub(crate) const KEPT_FROM: u64 = 1 << 23;
 
 /// What is to be measured.
 #[derive(Clone, Copy, Debug)]
@@ -37,9 +37,10 @@ pub struct Measure {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Square {
-    /// The largest distance, metres, of its surface from the samples, holes excepted: with any of its sides one
-    /// level coarser too, and at least `growth` times that of the squares in it. 0 at level 0, where only a coarser side
-    /// is off the samples, and that is within the error of the square beyond it.
+    /// The largest distance, metres, of its surface from the samples, holes excepted, and at least that of the squares
+    /// in it. In [`Bounds`]: with any of its sides one level coarser too, and at least `growth` times that of the squares
+    /// in it; 0 at level 0, where only a coarser side is off the samples, and that is within the error of the square
+    /// beyond it.
     pub error: f32,
     /// Lowest and highest sample, metres; the lowest is above the highest if there is no land.
     pub range: [f32; 2],
@@ -72,15 +73,17 @@ impl Measure {
 }
 
 impl Square {
-    const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
+    /// Of nothing.
+    pub(crate) const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
 
-    /// Whether any triangle of the samples' own surface has data.
+    /// Whether there is any land; in [`Bounds`]: whether any triangle of the samples' own surface has data.
     #[inline]
     pub fn has_land(&self) -> bool {
         self.range[0] <= self.range[1]
     }
 
-    fn union(self, other: Square) -> Square {
+    /// Of two squares together.
+    pub(crate) fn union(self, other: Square) -> Square {
         let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
         Square { error: self.error.max(other.error), range }
     }

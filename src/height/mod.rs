@@ -11,7 +11,7 @@ mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
-mod kept;
+pub(crate) mod kept;
 pub mod level_errors;
 pub mod levels;
 mod load;

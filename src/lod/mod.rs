@@ -3,6 +3,7 @@
 //! Pure computation: no device, no file, no clock. Rooms never use each other.
 
 pub mod brute_force;
+pub mod budget;
 pub mod clusters;
 pub mod geomipmap;
 pub mod settings;

@@ -66,6 +66,7 @@ impl Rule {
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
         self.technique.as_deref().is_none_or(|name| name == case.technique)
             && self.settings.iter().all(|(key, value)| case.settings.get(key) == Some(value))
+            && case.goal.is_none()
             && self.tolerance_px.is_none_or(|px| px == case.tolerance_px)
             && self.terrain.as_deref().is_none_or(|name| name == case.terrain.name)
             && self.side.is_none_or(|side| case.terrain.size == [side; 2])

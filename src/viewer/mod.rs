@@ -16,6 +16,7 @@ use winit::event_loop::EventLoop;
 
 use crate::gpu::Choice;
 use crate::height::Field;
+use crate::lod::budget::Target;
 use crate::lod::{Entry, Settings};
 use crate::plan::Look;
 use crate::view::View;
@@ -36,6 +37,8 @@ pub struct Setup {
     pub technique: (&'static Entry, Settings),
     /// What was set on that technique.
     pub choices: Vec<(String, String)>,
+    /// What a frame is to cost, by moving the view's tolerance.
+    pub target: Option<Target>,
     /// How the land looks.
     pub look: Look,
     /// A picture laid over it, for when the colours are its.

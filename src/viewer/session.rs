@@ -9,6 +9,7 @@ use super::camera::{Camera, Motion};
 use super::hud::Row;
 use super::stage::Figures;
 use super::times::Smoothed;
+use crate::lod::budget::{Controller, RANGE_PX, Target};
 use crate::lod::{Entry, Settings, TECHNIQUES};
 use crate::plan::{Colour, Look};
 use crate::view::{Metric, Tolerance, View};
@@ -32,6 +33,8 @@ pub struct Session {
     pub wants_copy: bool,
     shows_numbers: bool,
     tolerance: Tolerance,
+    /// What moves the tolerance, if anything does.
+    budget: Option<Controller>,
     /// The colours that level colours go back to.
     plain: Colour,
     note: Option<(String, Instant)>,
@@ -65,6 +68,7 @@ impl Session {
             wants_copy: false,
             shows_numbers: true,
             tolerance: setup.view.tolerance,
+            budget: setup.target.map(|target| Controller::new(target, setup.view.tolerance.px, RANGE_PX)),
             plain: if setup.look.colour == Colour::Level { Colour::Height } else { setup.look.colour },
             note: None,
             frame: Smoothed::default(),
@@ -86,7 +90,11 @@ impl Session {
                 let current = names.iter().position(|name| *name == settings.variant()).unwrap_or(0);
                 return self.take(setup, entry, names[(current + 1) % names.len()]);
             }
-            Action::Tolerance(factor) => self.tolerance.px = (self.tolerance.px * factor).clamp(1.0 / 64.0, 256.0),
+            Action::Tolerance(factor) => {
+                // Who sets it by hand no longer wants it moved.
+                self.budget = None;
+                self.tolerance.px = (self.tolerance.px * factor).clamp(RANGE_PX[0], RANGE_PX[1]);
+            }
             Action::Wireframe => {
                 self.look.wireframe = !self.look.wireframe;
                 return Request::Look;
@@ -129,6 +137,20 @@ impl Session {
         self.frame.add(dt * 1e3, dt);
         self.select.add(figures.select_ms, dt);
         self.gpu.add(figures.gpu_ms, dt);
+        if !self.frozen {
+            self.hold(figures, dt);
+        }
+    }
+
+    /// Moves the tolerance by what the last frame cost.
+    fn hold(&mut self, figures: &Figures, dt: f64) {
+        let Some(budget) = &mut self.budget else { return };
+        let cost = match budget.target() {
+            Target::Triangles(_) => figures.triangles as f64,
+            Target::FrameMs(_) => dt * 1e3,
+        };
+        budget.learn(figures.tolerance_px, cost);
+        self.tolerance.px = budget.tolerance_px();
     }
 
     /// The view of a frame.
@@ -165,6 +187,15 @@ impl Session {
         self.note.as_ref().filter(|(_, since)| since.elapsed() < NOTE).map(|(text, _)| text.as_str())
     }
 
+    /// What the tolerance holds.
+    fn held(&self) -> String {
+        match self.budget.as_ref().map(Controller::target) {
+            None => String::new(),
+            Some(Target::Triangles(count)) => format!(", holds {} triangles", grouped(count as u64)),
+            Some(Target::FrameMs(ms)) => format!(", holds {ms} ms"),
+        }
+    }
+
     /// The numbers over the picture.
     pub fn rows(&self, setup: &Setup, figures: &Figures) -> Vec<Row> {
         if !self.shows_numbers {
@@ -184,7 +215,10 @@ impl Session {
             row("triangles", grouped(figures.triangles)),
             row("draws", grouped(figures.draws as u64)),
             row("technique", format!("{}{frozen}", self.technique_name())),
-            row("tolerance", format!("{:.2} px {metric}{}", self.tolerance.px, widened(figures.widening))),
+            row(
+                "tolerance",
+                format!("{:.2} px {metric}{}{}", self.tolerance.px, self.held(), widened(figures.widening)),
+            ),
             row("colours", format!("{}{wire}", colour_name(self.look.colour))),
             row("camera", format!("{}, {}", self.camera.mode_name(), speed_text(self.camera.speed(&setup.field)))),
             row("position", format!("{x:.0} {y:.0} {z:.0} m")),

@@ -46,6 +46,8 @@ pub struct Figures {
     pub draws: usize,
     /// What the tolerance was multiplied by: 1 where it was kept.
     pub widening: f64,
+    /// Error allowed, pixels.
+    pub tolerance_px: f64,
 }
 
 /// What a frame shows.
@@ -150,7 +152,7 @@ impl Stage {
         }
         let list = &self.list;
         (self.figures.triangles, self.figures.draws) = (list.triangles(), list.draws.len());
-        self.figures.widening = list.widening;
+        (self.figures.widening, self.figures.tolerance_px) = (list.widening, shot.view.tolerance.px);
         let mut overlay = overlay(&self.figures);
         self.hud.update(std::mem::take(&mut overlay.textures))?;
         let started = Instant::now();

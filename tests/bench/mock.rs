@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
+use cuesta::bench::held::Helm;
 use cuesta::bench::rows::{
     AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, Plan, Pop, Reference,
     Summary, Waiting, Within, Worst,
@@ -44,14 +45,18 @@ impl Laboratory for Mock {
     fn time(&mut self, scene: &Scene) -> Result<Timed> {
         let call = self.calls.len();
         self.calls.push(format!("time {}", scene.case));
-        let triangles = triangles(scene.case);
+        let mut helm = Helm::new(scene.case);
         let frame = |k: usize| {
+            let view = helm.view(&scene.views[k]);
+            let triangles = triangles(scene.case, view.tolerance.px);
             // The warm-up is slow.
             let slow = if k < 3 { 10.0 } else { 1.0 + 0.05 * ((k * 7 + call * 13) % 10) as f64 / 10.0 };
             let gpu_ms = (8.0 + triangles / 4e3) * slow;
             let [select_ms, record_ms] = [0.2 + triangles / 4e5, 0.3];
+            let frame_ms = gpu_ms + select_ms + record_ms + 0.4;
+            helm.learn(&view, triangles as u64, frame_ms);
             Frame {
-                frame_ms: gpu_ms + select_ms + record_ms + 0.4,
+                frame_ms,
                 select_ms,
                 record_ms,
                 gpu_ms: (!self.is_bare).then_some(gpu_ms),
@@ -63,6 +68,7 @@ impl Laboratory for Mock {
                 commands: 1,
                 widening: 1.0,
                 waiting: 0,
+                tolerance_px: view.tolerance.px,
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);
@@ -129,12 +135,12 @@ fn angle_bin(k: i32, is_truth: bool, is_paper: bool) -> AngleBin {
     AngleBin { from_deg, to_deg, p999: max * 0.8, max }
 }
 
-fn triangles(case: &Case) -> f64 {
+fn triangles(case: &Case, tolerance_px: f64) -> f64 {
     let samples = f64::from(case.terrain.size[0] - 1) * f64::from(case.terrain.size[1] - 1);
     let paper = if case.metric == "paper" { 0.8 } else { 1.0 };
     match case.technique.as_str() {
         "brute-force" => 2.0 * samples,
-        _ => paper * 0.9 * samples / (1.0 + case.tolerance_px),
+        _ => paper * 0.9 * samples / (1.0 + tolerance_px),
     }
 }
 
@@ -178,6 +184,7 @@ pub fn case(terrain: &Terrain, technique: &str, tolerance_px: f64, metric: &str,
         technique: technique.to_string(),
         settings: BTreeMap::new(),
         tolerance_px,
+        goal: None,
         metric: metric.to_string(),
         path: path.to_string(),
         size: [320, 180],

@@ -1,6 +1,7 @@
 //! The benchmark's driver, rows and comparison, with a laboratory that makes its numbers up.
 
 mod comparing;
+mod holding;
 pub mod mock;
 mod paths;
 mod resuming;

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use boon::{Compiler, SchemaIndex, Schemas};
+use cuesta::bench::Case;
+use cuesta::bench::held::Goal;
 use cuesta::bench::journal::ROWS;
 use cuesta::bench::results::{self, RESULTS, Results, TABLE};
 use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary};
@@ -23,7 +25,9 @@ fn schemas() -> (Schemas, [SchemaIndex; 2]) {
 
 fn benchmark(folder: &Path) -> Results {
     let fields = vec![mock::field(33), mock::field(65)];
-    let cases = mock::cases(&fields, &["circle"]);
+    let mut cases = mock::cases(&fields, &["circle"]);
+    let of = |goal| Case { goal: Some(goal), ..mock::case(&fields[0].0, "geomipmap", 1.0, "certified", "circle") };
+    cases.extend([Goal::Triangles(1e3), Goal::FrameMs(9.0)].map(of));
     mock::run(folder, fields, cases, 2);
     Results::read(folder).unwrap()
 }
@@ -56,12 +60,14 @@ fn what_is_not_as_documented_is_found() {
     benchmark(folder.path());
     let (schemas, [whole, _]) = schemas();
     let value: Value = serde_json::from_str(&text(folder.path(), RESULTS)).unwrap();
-    let changes: [fn(&mut Value); 6] = [
+    let changes: [fn(&mut Value); 8] = [
         |v| v["schema"] = 2.into(),
         |v| v["cases"][0]["case"]["metric"] = "other".into(),
         |v| v["cases"][0]["rounds"][0]["hitches"] = (-1).into(),
         |v| v["cases"][0]["rounds"][0]["frame_ms"]["p50"] = Value::Null,
         |v| v["cases"][0]["errors"]["unheard_of"] = 1.into(),
+        |v| v["cases"][11]["case"]["goal"]["frame_ms"] = 1.into(),
+        |v| v["cases"][11]["rounds"][0]["held"]["settled"] = 1.5.into(),
         |v| v["header"]["machine"].as_object_mut().unwrap().clear(),
     ];
     for (k, change) in changes.iter().enumerate() {

@@ -24,6 +24,7 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
         technique: technique.to_string(),
         settings: Default::default(),
         tolerance_px,
+        goal: None,
         metric: "certified".to_string(),
         path: "circle".to_string(),
         size: [160, 100],

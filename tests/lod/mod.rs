@@ -1,5 +1,7 @@
 //! What single techniques promise beyond the laws of `conformance`.
 
+mod budget;
+mod budget_circle;
 mod clusters;
 mod morph;
 mod skirts;

@@ -44,7 +44,7 @@ impl<'a> Certified<'a> {
             return;
         }
         let square = self.errors.square(level, at);
-        if !square.has_data() || square.error == 0.0 {
+        if !square.has_land() || square.error == 0.0 {
             return;
         }
         let bounds = bounds(self.field, level, at, around);

@@ -8,31 +8,9 @@ use rayon::prelude::*;
 
 use super::shapes::{Shape, Shapes};
 use crate::height::Field;
+use crate::height::bounds::{KEPT_FROM, Square};
+use crate::height::kept::Kept;
 use crate::height::surface::{self, Corner};
-
-/// What is known of a square.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Square {
-    /// The largest distance, metres, of its triangles from the samples; at least that of the squares in it.
-    pub error: f32,
-    /// Lowest and highest sample, metres; the lowest is above the highest if there are no data.
-    pub range: [f32; 2],
-}
-
-impl Square {
-    const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
-
-    /// Whether any sample has data.
-    #[inline]
-    pub fn has_data(&self) -> bool {
-        self.range[0] <= self.range[1]
-    }
-
-    fn union(self, other: Square) -> Square {
-        let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
-        Square { error: self.error.max(other.error), range }
-    }
-}
 
 /// All squares of a field up to a level.
 pub struct Errors {
@@ -55,18 +33,53 @@ struct Level {
 type Patterns = [[Vec<[[i32; 2]; 3]>; 4]; 2];
 
 impl Errors {
-    /// Measures a field up to level `most`, in parallel.
+    /// Measures a field up to level `most`, in parallel, or finds what was kept when it was measured before.
     pub fn new(field: &Field, most: u32) -> Self {
         let (size, stored) = (field.size(), field.stored());
         let is_tiled = [0, 1].map(|k| size[k] > stored[k]);
         let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new(), land: Vec::new() };
+        let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
+        let kept = is_large.then(|| Kept::new(field, &format!("strips-{most}"))).flatten();
+        if kept.as_ref().and_then(Kept::read).is_some_and(|content| errors.fill(field, most, &content)) {
+            return errors;
+        }
+        errors.measure(field, most);
+        kept.inspect(|kept| kept.write(&errors.content()));
+        errors
+    }
+
+    fn measure(&mut self, field: &Field, most: u32) {
         let patterns = patterns();
         for level in 1..=most {
-            let level = errors.measured(field, level, &patterns);
-            errors.levels.push(level);
+            let level = self.measured(field, level, &patterns);
+            self.levels.push(level);
         }
-        errors.land = errors.measured_land(field, most);
-        errors
+        self.land = self.measured_land(field, most);
+    }
+
+    /// Everything that was measured.
+    fn content(&self) -> Vec<u8> {
+        let squares = self.levels.iter().flat_map(|level| bytemuck::cast_slice(&level.squares));
+        squares.copied().chain(self.land.iter().map(|&is_land| is_land.into())).collect()
+    }
+
+    /// Takes what was measured of a field like this one; `false`, and nothing changes, if it is not that long.
+    fn fill(&mut self, field: &Field, most: u32, content: &[u8]) -> bool {
+        let counts: Vec<_> = (1..=most).map(|level| self.count(field, level).unwrap_or([1, 1])).collect();
+        let squares = |[x, z]: [u32; 2]| x as usize * z as usize;
+        let lengths = counts.iter().map(|&count| squares(count) * size_of::<Square>());
+        let land = counts.last().map_or(0, |&count| squares(count));
+        if lengths.clone().sum::<usize>() + land != content.len() {
+            return false;
+        }
+        let mut rest = content;
+        for (&count, length) in counts.iter().zip(lengths) {
+            let (own, after) = rest.split_at(length);
+            self.levels.push(Level { count, squares: bytemuck::pod_collect_to_vec(own) });
+            rest = after;
+        }
+        self.land = rest.iter().map(|&byte| byte != 0).collect();
+        true
     }
 
     fn measured_land(&self, field: &Field, level: u32) -> Vec<bool> {
@@ -95,7 +108,7 @@ impl Errors {
     #[inline]
     pub fn square(&self, level: u32, at: [i32; 2]) -> Square {
         let square = self.held(level, at);
-        if square.has_data() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
+        if square.has_land() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
             let parent =
                 if self.levels.len() > level as usize { self.held(level + 1, at.map(|n| n >> 1)) } else { square };
             return Square { error: parent.range[1] - parent.range[0], ..square };
@@ -111,7 +124,9 @@ impl Errors {
     #[inline]
     fn index(&self, level: u32, at: [i32; 2]) -> usize {
         let count = self.levels[level as usize - 1].count;
-        let [x, z] = [0, 1].map(|k| if self.is_tiled[k] { at[k] as u32 % count[k] } else { at[k] as u32 });
+        // Squares that may lie anywhere are one, along an axis that is not tiled too.
+        let repeats = |k: usize| self.is_tiled[k] || count[k] == 1;
+        let [x, z] = [0, 1].map(|k| if repeats(k) { at[k] as u32 % count[k] } else { at[k] as u32 });
         (z * count[0] + x) as usize
     }
 
@@ -125,15 +140,17 @@ impl Errors {
         self.levels.last().into_iter().flat_map(|level| &level.squares).fold(Square::NOTHING, |a, b| a.union(*b)).range
     }
 
-    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
-        // A tiled axis is held once if its squares, and the pairs of them, lie alike in every tile.
+    /// Squares held of a level along (x, z); `None` if they may lie anywhere: a tiled axis is held once if its squares,
+    /// and the pairs of them, lie alike in every tile.
+    fn count(&self, field: &Field, level: u32) -> Option<[u32; 2]> {
         let stored = field.stored();
         let repeats = |k: usize| !self.is_tiled[k] || stored[k].is_multiple_of(2 << level);
-        if !repeats(0) || !repeats(1) {
-            return self.anything(field);
-        }
         let length = |k: usize| if self.is_tiled[k] { stored[k] } else { stored[k] - 1 };
-        let count = [0, 1].map(|k| length(k).div_ceil(1 << level));
+        (repeats(0) && repeats(1)).then(|| [0, 1].map(|k| length(k).div_ceil(1 << level)))
+    }
+
+    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
+        let Some(count) = self.count(field, level) else { return self.anything(field) };
         let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
             let at = [k % count[0], k / count[0]].map(|n| n as i32);
             self.measured_square(field, level, at, patterns)
@@ -150,7 +167,7 @@ impl Errors {
 
     fn measured_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
         let inner = self.inner(field, level, at);
-        if !inner.has_data() {
+        if !inner.has_land() {
             return inner;
         }
         let parity = ((at[0] + at[1]) & 1) as usize;
@@ -264,6 +281,25 @@ mod tests {
             for [a, b, c] in triangles {
                 assert!((b[1] - a[1]) * (c[0] - a[0]) > (b[0] - a[0]) * (c[1] - a[1]));
             }
+        }
+    }
+
+    #[test]
+    fn what_was_kept_is_what_was_measured() {
+        let rough = |size: [u32; 2], by: u32| {
+            let heights = (0..size[0] * size[1]).map(|k| ((k * by) % 1009) as f32).collect();
+            Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none((size[0] * size[1]) as usize))
+        };
+        for field in [rough([75, 52], 7919), rough([64, 32], 7919).tiled([2, 2]), rough([41, 32], 7919).tiled([2, 1])] {
+            let measured = Errors::new(&field, 4);
+            let content = measured.content();
+            let mut again = Errors { levels: Vec::new(), land: Vec::new(), ..Errors::new(&field, 1) };
+            assert!(again.fill(&field, 4, &content));
+            assert_eq!(again.content(), content);
+            let last = field.size().map(|n| (n as i32 - 2) >> 2);
+            assert_eq!(again.square(2, last), measured.square(2, last));
+            let mut short = Errors { levels: Vec::new(), land: Vec::new(), ..Errors::new(&field, 1) };
+            assert!(!short.fill(&field, 4, &content[1..]) && !short.fill(&field, 3, &content));
         }
     }
 

@@ -47,7 +47,7 @@ use self::pages::{Gaze, Grid, Pages, Row};
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
-use self::walk::{Ground, Stream};
+use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
@@ -108,6 +108,8 @@ struct SortedStrips {
     shapes: Shapes,
     pages: Pages,
     splits: Splits,
+    /// One a row of pages, or one for all.
+    workers: Vec<Worker>,
     /// Length of a triangle's side, tolerances, if levels are uniform.
     edge: Option<f64>,
     blends: bool,
@@ -135,6 +137,7 @@ impl SortedStrips {
             shapes: Shapes::default(),
             pages: Pages::none(grid),
             splits: Splits::new(grid),
+            workers: Vec::new(),
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
             is_back_to_front: settings.word("order") == "back",
@@ -160,49 +163,73 @@ impl SortedStrips {
         self.pages.set(seen);
     }
 
-    /// Walks the rows of a frame, in parallel or one after the other to the same streams; `None` if they would not fit
-    /// the limits.
-    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
-        let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
+    /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the first; its
+    /// last index by row. `None` if they would not fit the limits.
+    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<usize>> {
+        let (field, pages, shapes, limits) = (&*self.field, &self.pages, &self.shapes, self.limits);
         let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: self.blends };
+        let has_room = |vertices: usize, indices: usize| vertices <= limits.vertices && indices <= limits.indices;
+        if self.is_serial {
+            let worker = &mut workers[0];
+            let walk = |row: &Row| {
+                ground.walk_on(row, worker);
+                let Stream { vertices, indices } = &worker.stream;
+                has_room(vertices.len(), indices.len()).then_some(indices.len())
+            };
+            return rows.iter().map(walk).collect();
+        }
         let (vertices, indices) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let is_within = |count: &AtomicUsize, more: usize, most: usize| count.fetch_add(more, Relaxed) + more <= most;
-        let walk = |row: &Row| {
+        let walk = |(row, worker): (&Row, &mut Worker)| {
             // Once there is too much, no further row is begun.
-            if vertices.load(Relaxed) > self.limits.vertices || indices.load(Relaxed) > self.limits.indices {
+            if !has_room(vertices.load(Relaxed), indices.load(Relaxed)) {
                 return None;
             }
-            let stream = ground.walk(row);
-            let fits = is_within(&vertices, stream.vertices.len(), self.limits.vertices)
-                && is_within(&indices, stream.indices.len(), self.limits.indices);
-            fits.then_some(stream)
+            ground.walk_on(row, worker);
+            let Stream { vertices: v, indices: i } = &worker.stream;
+            let [v, i] = [(&vertices, v.len()), (&indices, i.len())].map(|(sum, n)| (sum.fetch_add(n, Relaxed) + n, n));
+            has_room(v.0, i.0).then_some(i.1)
         };
-        if self.is_serial { rows.iter().map(walk).collect() } else { rows.par_iter().map(walk).collect() }
+        rows.par_iter().zip(workers).map(walk).collect()
     }
 
-    /// The frame's strips under the view's tolerance, or `None` if they would not fit.
-    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> Option<Vec<Stream>> {
+    /// The frame's strips under the view's tolerance, as [`Self::walk`] leaves them.
+    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<usize>> {
+        for worker in &mut *workers {
+            worker.stream.clear();
+        }
         if let Some(edge) = self.edge {
             let levels = Radial::uniform(&self.field, view, edge * view.tolerance.px, self.pages.grid.level);
             let levels = if self.blends { levels.blending(self.pages.grid.level) } else { levels };
-            return self.walk(&levels, gaze, rows);
+            return self.walk(&levels, gaze, rows, workers);
         }
         self.splits.clear();
         // A split square has at least six triangles more.
         let most = self.limits.indices / 18 + 1;
         let certified = Certified::new(&self.field, &self.errors, &self.pages, view, most);
-        if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows) } else { None }
+        if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
     }
 
-    fn fill(&self, streams: Vec<Stream>, list: &mut DrawList) {
-        for (batch, stream) in (0u32..).zip(streams) {
-            let (base, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
-            list.streamed.vertices.extend(stream.vertices);
-            list.streamed.indices.extend(stream.indices.iter().map(|k| base + k));
+    fn fill(&self, ends: &[usize], workers: &mut [Worker], list: &mut DrawList) {
+        let streamed = &mut list.streamed;
+        if self.is_serial {
+            let Stream { vertices, indices } = &mut workers[0].stream;
+            std::mem::swap(&mut streamed.vertices, vertices);
+            std::mem::swap(&mut streamed.indices, indices);
+        } else {
+            for Stream { vertices, indices } in workers[..ends.len()].iter().map(|worker| &worker.stream) {
+                let base = streamed.vertices.len() as u32;
+                streamed.vertices.extend_from_slice(vertices);
+                streamed.indices.extend(indices.iter().map(|k| base + k));
+            }
+        }
+        let mut first = 0;
+        for (batch, &end) in (0u32..).zip(ends) {
             list.instances.push(Instance { batch, ..Instance::default() });
-            let indices = first..list.streamed.indices.len() as u32;
+            let end = if self.is_serial { end as u32 } else { first + end as u32 };
             let (source, topology) = (Source::Streamed, Topology::Triangles);
-            list.draws.push(Draw { source, topology, indices, instances: batch..batch + 1, first_vertex: 0 });
+            let instances = batch..batch + 1;
+            list.draws.push(Draw { source, topology, indices: first..end, instances, first_vertex: 0 });
+            first = end;
         }
         if self.is_back_to_front {
             turn_round(list);
@@ -233,14 +260,18 @@ impl Technique for SortedStrips {
         self.look(view);
         let gaze = Gaze::new(&self.field, view);
         let rows = self.pages.rows(&gaze);
+        let mut workers = std::mem::take(&mut self.workers);
+        let count = if self.is_serial { 1 } else { rows.len() };
+        workers.resize_with(count.max(workers.len()), Worker::default);
         let mut wider = *view;
-        let streams = loop {
-            if let Some(streams) = self.strips(&wider, &gaze, &rows) {
-                break streams;
+        let ends = loop {
+            if let Some(ends) = self.strips(&wider, &gaze, &rows, &mut workers) {
+                break ends;
             }
             wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
         };
-        self.fill(streams, list);
+        self.fill(&ends, &mut workers, list);
+        self.workers = workers;
         list.widening =
             if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px };
     }

@@ -34,10 +34,9 @@ impl Table {
     /// level 1, up to `most`. The table reaches further by `more_m`, for repairs. Its entries are those of any larger
     /// unit or divide them, so that a smaller unit never gives a finer level.
     pub fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
-        let reach_m = unit_m * f64::from(1u32 << most.saturating_sub(1)) + more_m;
-        let scale = 0.25f64.powf((reach_m / ((ENTRIES - 1) as f64).sqrt()).log2().ceil());
+        let scale = doubling_scale(unit_m, most, more_m);
         let level = |k: usize| {
-            let distance = (k as f64 / scale).sqrt() / unit_m;
+            let distance = doublings(k, scale, unit_m);
             (0..most).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
         };
         Self { levels: (0..ENTRIES).map(level).collect(), scale }
@@ -49,68 +48,112 @@ impl Table {
         u32::from(self.levels[((squared_m2 * self.scale) as usize).min(self.levels.len() - 1)])
     }
 
-    /// The entry from which on every level is at least this one.
-    fn begin(&self, level: u32) -> usize {
-        self.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1)
-    }
-
-    /// Distance at which an entry begins, metres; infinite beyond the last.
-    fn distance_m(&self, entry: usize) -> f64 {
-        match entry {
-            0 => 0.0,
-            _ if entry < self.levels.len() => (entry as f64 / self.scale).sqrt(),
-            _ => f64::INFINITY,
-        }
-    }
-
-    /// Where a level must not begin before, metres, if the one before it begins at an entry: one diagonal of a square
-    /// of that one further, so that squares touching the last ones split at it are split too.
-    fn least_m(&self, before: usize, level: u32, diagonal_m: f64) -> f64 {
-        // Nothing is split where the level before holds everywhere.
-        let is_needed = level > 1 && before > 0;
-        if is_needed { self.distance_m(before) + diagonal_m * f64::from(1u32 << (level - 1)) } else { 0.0 }
-    }
-
-    /// Whether an entry begins at a distance or beyond it, but for rounding.
-    fn begins_at(&self, entry: usize, least_m: f64) -> bool {
-        self.distance_m(entry) >= least_m * (1.0 - 1e-12)
-    }
-
     /// The first level, from 1 to `most`, at which the table breaks its condition for cells of this diagonal
     /// (metres); `None` if it keeps it. Levels must rise with the distance, and none may begin before squares that
     /// touch those with the level before the last one have ended.
     pub fn broken_at(&self, diagonal_m: f64, most: u32) -> Option<u32> {
         let falls = self.levels.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| u32::from(pair[0]));
-        let is_early = |level: &u32| {
-            let least_m = self.least_m(self.begin(level - 1), *level, diagonal_m);
-            !self.begins_at(self.begin(*level), least_m)
-        };
-        falls.or_else(|| (2..=most).find(is_early))
+        let steps = Steps::of(self, most);
+        falls.or_else(|| (2..=most).find(|&level| !steps.begins_at(level, steps.least_m(level, diagonal_m))))
     }
 
     /// Lowers levels where they break the condition, and nowhere else.
     pub fn repair(&mut self, diagonal_m: f64, most: u32) {
-        let mut begins = vec![0];
-        for level in 1..=most {
-            let (own, least_m) = (self.begin(level), self.least_m(begins[level as usize - 1], level, diagonal_m));
-            let least = (least_m * least_m * self.scale).ceil().min(self.levels.len() as f64) as usize;
-            begins.push(if self.begins_at(own, least_m) { own } else { own.max(least) });
-        }
+        let begins = Steps::of(self, most).repaired(diagonal_m).begins;
         for (k, level) in self.levels.iter_mut().enumerate() {
             *level = begins.iter().rposition(|&begin| begin <= k).unwrap_or(0) as u8;
         }
     }
 }
 
-/// A table over a field, seen from somewhere.
+/// A table without its repetitions: levels that never fall, each by the entry at which it begins.
+#[derive(Clone, Debug, PartialEq)]
+struct Steps {
+    /// By level; the number of entries if it does not begin.
+    begins: Vec<usize>,
+    scale: f64,
+    entries: usize,
+}
+
+impl Steps {
+    /// From where on every level of a table is at least this one, up to `most`.
+    fn of(table: &Table, most: u32) -> Self {
+        let begin = |level: u32| table.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1);
+        Self { begins: (0..=most).map(begin).collect(), scale: table.scale, entries: table.levels.len() }
+    }
+
+    /// Those of [`Table::doubling`], without making it.
+    fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
+        let scale = doubling_scale(unit_m, most, more_m);
+        let begin = |level: u32| {
+            let least = f64::from((1u32 << level) >> 1);
+            // Rounding may be off by one on either side.
+            let about = ((unit_m * least).powi(2) * scale) as usize;
+            let begins = |k: &usize| level == 0 || doublings(*k, scale, unit_m) >= least;
+            (about.saturating_sub(1)..ENTRIES).find(begins).unwrap_or(ENTRIES)
+        };
+        Self { begins: (0..=most).map(begin).collect(), scale, entries: ENTRIES }
+    }
+
+    /// Levels begin later where they break the condition.
+    fn repaired(mut self, diagonal_m: f64) -> Self {
+        for level in 1..self.begins.len() {
+            let least_m = self.least_m(level as u32, diagonal_m);
+            if !self.begins_at(level as u32, least_m) {
+                let least = (least_m * least_m * self.scale).ceil().min(self.entries as f64) as usize;
+                self.begins[level] = self.begins[level].max(least);
+            }
+        }
+        self
+    }
+
+    /// Distance at which a level begins, metres; infinite if it does not.
+    fn distance_m(&self, level: u32) -> f64 {
+        match self.begins[level as usize] {
+            0 => 0.0,
+            entry if entry < self.entries => (entry as f64 / self.scale).sqrt(),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Where a level must not begin before, metres: one diagonal of a square of the one before it further than that
+    /// begins, so that squares touching the last ones split at it are split too.
+    fn least_m(&self, level: u32, diagonal_m: f64) -> f64 {
+        // Nothing is split where the level before holds everywhere.
+        let is_needed = level > 1 && self.begins[level as usize - 1] > 0;
+        if is_needed { self.distance_m(level - 1) + diagonal_m * f64::from(1u32 << (level - 1)) } else { 0.0 }
+    }
+
+    /// Whether a level begins at a distance or beyond it, but for rounding.
+    fn begins_at(&self, level: u32, least_m: f64) -> bool {
+        self.distance_m(level) >= least_m * (1.0 - 1e-12)
+    }
+}
+
+/// Entries per square metre of a table that reaches as far as it must: a power of four.
+fn doubling_scale(unit_m: f64, most: u32, more_m: f64) -> f64 {
+    let reach_m = unit_m * f64::from(1u32 << most.saturating_sub(1)) + more_m;
+    0.25f64.powf((reach_m / ((ENTRIES - 1) as f64).sqrt()).log2().ceil())
+}
+
+/// Distance of an entry in units.
+fn doublings(entry: usize, scale: f64, unit_m: f64) -> f64 {
+    (entry as f64 / scale).sqrt() / unit_m
+}
+
+/// A table over a field, seen from somewhere: entries are compared with those at which levels begin, which is the
+/// same as looking them up, and no table is needed in a frame.
 #[derive(Clone, Debug)]
 pub struct Radial {
-    table: Table,
     spacing: [f64; 2],
     /// The eye over the lattice, samples.
     eye: [f64; 2],
     /// Squared height of the eye above the land under it, metres².
     above_m2: f64,
+    /// Entries per square metre.
+    scale: f64,
+    /// By level: the entry at which it begins.
+    begins: Vec<f64>,
     /// By level: the distance from which on it is allowed, metres; empty if vertices do not blend.
     begins_m: Vec<f64>,
 }
@@ -121,30 +164,43 @@ impl Radial {
     pub fn uniform(field: &Field, view: &View, edge_px: f64, most: u32) -> Self {
         let [dx, dz] = field.spacing;
         let sample_px = view.focal_px() * dx.max(dz);
-        let mut table = match view.lens {
+        let steps = match view.lens {
             Lens::Perspective { .. } => {
-                Table::doubling(2.0 * sample_px / edge_px, most, dx.hypot(dz) * f64::from(2u32 << most))
+                Steps::doubling(2.0 * sample_px / edge_px, most, dx.hypot(dz) * f64::from(2u32 << most))
             }
             // The same level everywhere.
-            Lens::Orthographic { .. } => Table::new(
-                vec![(0..most).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8],
-                0.0,
-            ),
+            Lens::Orthographic { .. } => {
+                let level = (0..most).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8;
+                Steps::of(&Table::new(vec![level], 0.0), most)
+            }
         };
-        table.repair(dx.hypot(dz), most);
-        Self::new(field, view, table)
+        Self::of(field, view, &steps.repaired(dx.hypot(dz)))
     }
 
-    /// A table, seen from the view's eye.
-    pub fn new(field: &Field, view: &View, table: Table) -> Self {
+    /// A table up to level `most` that keeps its condition, seen from the view's eye.
+    pub fn new(field: &Field, view: &View, table: &Table, most: u32) -> Self {
+        Self::of(field, view, &Steps::of(table, most))
+    }
+
+    fn of(field: &Field, view: &View, steps: &Steps) -> Self {
         let eye = [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k]);
         let above_m = (view.eye.y - ground(field, eye)).max(0.0);
-        Self { table, spacing: field.spacing, eye, above_m2: above_m * above_m, begins_m: Vec::new() }
+        // The last entry holds for all greater distances: what does not begin up to there never does.
+        let begin = |&entry: &usize| if entry < steps.entries { entry as f64 } else { f64::INFINITY };
+        Self {
+            spacing: field.spacing,
+            eye,
+            above_m2: above_m * above_m,
+            scale: steps.scale,
+            begins: steps.begins.iter().map(begin).collect(),
+            begins_m: Vec::new(),
+        }
     }
 
     /// Vertices of levels below `most` go over into the next level (Finch & Bishop, §4.9).
     pub fn blending(mut self, most: u32) -> Self {
-        self.begins_m = (0..=most).map(|level| self.table.distance_m(self.table.begin(level))).collect();
+        let distance_m = |begin: &f64| if *begin > 0.0 { (begin / self.scale).sqrt() } else { 0.0 };
+        self.begins_m = self.begins[..=most as usize].iter().map(distance_m).collect();
         self
     }
 }
@@ -167,7 +223,7 @@ impl Levels for Radial {
             (first - self.eye[k]).max(self.eye[k] - last).max(0.0) * self.spacing[k]
         };
         let (x, z) = (away_m(0), away_m(1));
-        self.table.level(x * x + z * z + self.above_m2) < level
+        (x * x + z * z + self.above_m2) * self.scale < self.begins[level as usize]
     }
 
     /// It begins half way from where the level begins to where the next one does, and ends there.
@@ -214,6 +270,37 @@ mod tests {
             assert!(table.levels.iter().zip(&before.levels).all(|(new, old)| new <= old), "a level was raised");
         }
         assert!(broken > 50 && kept > 50, "{broken} broken, {kept} kept");
+    }
+
+    /// What is compared is what a table would say, at every entry and between them.
+    #[test]
+    fn comparing_is_looking_up() {
+        let field = crate::height::synth::synth(crate::height::synth::Kind::Flat, [9, 9], 1);
+        let view = View {
+            eye: glam::DVec3::ZERO,
+            world_from_eye: View::turned(0.0, 0.0, 0.0),
+            lens: Lens::Perspective { fov_x: 1.0 },
+            size: [100, 100],
+            near: 1.0,
+            tolerance: crate::view::Tolerance { px: 1.0, metric: crate::view::Metric::Certified },
+            time_s: 0.0,
+        };
+        for (unit_m, most, more_m) in [(10.0, 5, 1.0), (3.7, 6, 40.0), (0.01, 4, 9.0), (1e5, 8, 700.0), (1.0, 1, 0.5)] {
+            let mut table = Table::doubling(unit_m, most, more_m);
+            let steps = Steps::doubling(unit_m, most, more_m);
+            assert_eq!(steps, Steps::of(&table, most), "unit {unit_m} m");
+            table.repair(0.3 * unit_m, most);
+            let repaired = steps.repaired(0.3 * unit_m);
+            assert_eq!(repaired, Steps::of(&table, most), "unit {unit_m} m");
+            let radial = Radial::of(&field, &view, &repaired);
+            for entry in 0..ENTRIES + 100 {
+                let squared_m2 = (entry as f64 + 0.5) / table.scale;
+                let is_split = |level: usize| squared_m2 * radial.scale < radial.begins[level];
+                for level in 1..=most {
+                    assert_eq!(is_split(level as usize), table.level(squared_m2) < level, "entry {entry}, {level}");
+                }
+            }
+        }
     }
 
     #[test]

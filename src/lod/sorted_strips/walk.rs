@@ -41,6 +41,23 @@ pub struct Stream {
     pub indices: Vec<u32>,
 }
 
+impl Stream {
+    /// Empties it and keeps its memory.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.indices.clear();
+    }
+}
+
+/// What walking a row needs and leaves: kept from frame to frame, it allocates nothing.
+#[derive(Default)]
+pub struct Worker {
+    /// What was walked: rows follow each other in it until it is taken or cleared.
+    pub stream: Stream,
+    marks: Vec<Mark>,
+    start: Vec<u32>,
+}
+
 /// What every row of a frame is walked with.
 pub struct Ground<'a, L> {
     /// The field.
@@ -130,23 +147,33 @@ struct Walk<'a, L> {
 impl<L: Levels> Ground<'_, L> {
     /// Walks a row of pages.
     pub fn walk(&self, row: &Row) -> Stream {
+        let mut worker = Worker::default();
+        self.walk_on(row, &mut worker);
+        worker.stream
+    }
+
+    /// Walks a row of pages and appends it to the worker's stream.
+    pub fn walk_on(&self, row: &Row, worker: &mut Worker) {
         let (side, minor) = (self.pages.grid.side(), 1 - self.major);
         let behind = |sign: i32, n: i32| (if sign > 0 { n } else { n + 1 }) * side;
         let longest = row.runs.iter().map(|run| run.pages * side).max().unwrap_or(0);
         let mut walk = Walk {
             ground: self,
-            stream: Stream::default(),
+            stream: std::mem::take(&mut worker.stream),
             origin: [0, behind(row.sign, row.row)],
             signs: [0, row.sign],
             eye: [0.0; 2],
             length: 0,
-            marks: vec![Mark { v: UNUSED, vertex: UNMADE }; longest as usize + 1],
-            start: vec![UNMADE; side as usize + 1],
+            marks: std::mem::take(&mut worker.marks),
+            start: std::mem::take(&mut worker.start),
             has_behind: false,
             has_beside: false,
             mirrored: false,
             sticks_out: false,
         };
+        // Each run fills its own part of the marks.
+        walk.marks.resize((longest as usize + 1).max(walk.marks.len()), Mark { v: UNUSED, vertex: UNMADE });
+        walk.start.resize(side as usize + 1, UNMADE);
         let mut last_start = None;
         for run in &row.runs {
             walk.origin[0] = behind(run.sign, run.first);
@@ -163,7 +190,7 @@ impl<L: Levels> Ground<'_, L> {
             last_start = Some(walk.origin[0]);
             walk.run(row, run);
         }
-        walk.stream
+        *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start };
     }
 }
 

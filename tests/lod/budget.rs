@@ -1,0 +1,248 @@
+//! The budget controller against made-up costs: loads that step, climb, spike and swing, curves from nearly flat to
+//! slopes of 10⁴ and stairs, late and noisy costs.
+
+use std::collections::VecDeque;
+
+use cuesta::lod::budget::{Controller, Target};
+
+/// Least and greatest tolerance, pixels.
+const RANGE_PX: [f64; 2] = [1.0 / 64.0, 256.0];
+/// What is held, in the target's unit.
+const COST: f64 = 1e5;
+/// The frame at which loads change: everything has settled.
+const EVENT: usize = 60;
+
+/// A made-up renderer.
+struct Load<'a> {
+    /// Cost by tolerance.
+    curve: &'a dyn Fn(f64) -> f64,
+    /// What it is multiplied by, by frame.
+    factor: &'a dyn Fn(usize) -> f64,
+    /// How many frames after a frame its cost is known: 1 is before the next one.
+    delay: usize,
+    /// Costs are off by up to this share.
+    noise: f64,
+    /// Of the noise.
+    seed: u64,
+}
+
+/// What a frame was drawn with, and what it cost over the target, noise left out.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    px: f64,
+    cost: f64,
+}
+
+impl Load<'_> {
+    fn fly(&self, target: Target, first_px: f64, frames: usize) -> Vec<Frame> {
+        let mut controller = Controller::new(target, first_px, RANGE_PX);
+        let mut state = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
+        let mut late = VecDeque::new();
+        let mut fly = |k: usize| {
+            let px = controller.tolerance_px();
+            let cost = (self.curve)(px) * (self.factor)(k);
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let share = (state >> 11) as f64 / (1u64 << 53) as f64;
+            late.push_back((px, cost * (1.0 + self.noise * (2.0 * share - 1.0))));
+            if late.len() >= self.delay {
+                let (px, cost) = late.pop_front().expect("one at least");
+                controller.learn(px, cost);
+            }
+            Frame { px, cost: cost / target.cost() }
+        };
+        (0..frames).map(&mut fly).collect()
+    }
+}
+
+/// How much more than the target anything cost once no more than a fifth was too much.
+fn overshoot(frames: &[Frame]) -> f64 {
+    let reached = frames.iter().position(|frame| frame.cost <= 1.2).unwrap_or(0);
+    frames[reached..].iter().map(|frame| frame.cost - 1.0).fold(0.0, f64::max)
+}
+
+/// Frames until all are within a share of the target.
+fn settling(frames: &[Frame], share: f64) -> usize {
+    frames.iter().rposition(|frame| (frame.cost - 1.0).abs() > share).map_or(0, |k| k + 1)
+}
+
+fn constant(_: usize) -> f64 {
+    1.0
+}
+
+/// Costs COST at 1 px.
+fn power(slope: f64) -> impl Fn(f64) -> f64 {
+    move |px: f64| (COST * px.powf(-slope)).clamp(10.0, 1e8)
+}
+
+fn step(factor: f64) -> impl Fn(usize) -> f64 {
+    move |k| if k < EVENT { 1.0 } else { factor }
+}
+
+/// Starts too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px, load)`.
+type Event = (&'static str, usize, f64, Box<dyn Fn(usize) -> f64>);
+
+fn events() -> Vec<Event> {
+    vec![
+        ("from 4 px", 0, 4.0, Box::new(constant)),
+        ("from 1/4 px", 0, 0.25, Box::new(constant)),
+        ("three times as much", EVENT, 1.0, Box::new(step(3.0))),
+        ("a third", EVENT, 1.0, Box::new(step(1.0 / 3.0))),
+    ]
+}
+
+#[test]
+fn without_noise_it_settles_in_fifteen_frames_and_does_not_overshoot() {
+    let mut worst = (0.0f64, 0);
+    for (slope, delay) in [0.3, 0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
+        for (name, event, first_px, factor) in events() {
+            let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.0, seed: 0 };
+            let frames = &load.fly(Target::Triangles(COST), first_px, 160)[event..];
+            let (overshoot, settling) =
+                (overshoot(&frames[if event > 0 { delay } else { 0 }..]), settling(frames, 0.05));
+            assert!(overshoot <= 0.2 && settling <= 15, "slope {slope}, delay {delay}, {name}: {overshoot} {settling}");
+            worst = (worst.0.max(overshoot), worst.1.max(settling));
+        }
+    }
+    println!("overshoot {:.3}, settled in {} frames at most", worst.0, worst.1);
+}
+
+/// Of 200 seeds: the medians, and what 95 % are within.
+fn spread(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    [values[values.len() / 2], values[values.len() * 95 / 100]]
+}
+
+#[test]
+fn with_noise_of_thirty_percent_the_expected_cost_is_held() {
+    for (slope, delay) in [0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
+        for (name, event, first_px, factor) in events() {
+            let of_seed = |seed: u64| {
+                let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.3, seed };
+                let frames = &load.fly(Target::FrameMs(COST), first_px, 120)[event..];
+                // What was drawn before the change could be known is no overshoot.
+                let known = if event > 0 { delay + 1 } else { 0 };
+                (overshoot(&frames[known..]), settling(frames, 0.2) as f64)
+            };
+            let (overshoots, settlings) = (0..200).map(of_seed).unzip();
+            let (overshoots, settlings) = (spread(overshoots), spread(settlings));
+            println!("slope {slope}, delay {delay}, {name}: overshoot {overshoots:.2?}, settled in {settlings:?}");
+            let what = format!("slope {slope}, delay {delay}, {name}");
+            assert!(overshoots[0] <= 0.2 && overshoots[1] <= 0.4, "{what}: overshoot {overshoots:?}");
+            assert!(settlings[0] <= 15.0 && settlings[1] <= 25.0, "{what}: settled in {settlings:?}");
+        }
+    }
+}
+
+/// A controller that acted on each cost would move τ by a third all the time.
+#[test]
+fn noise_alone_makes_no_limit_cycle() {
+    for delay in [1, 2, 3] {
+        let of_seed = |seed: u64| {
+            let load = Load { curve: &power(1.0), factor: &constant, delay, noise: 0.3, seed };
+            let frames = load.fly(Target::FrameMs(COST), 1.0, 400);
+            let moves = frames.windows(2).filter(|pair| pair[0].px != pair[1].px).count();
+            let rms = (frames.iter().map(|frame| (frame.cost - 1.0).powi(2)).sum::<f64>() / 400.0).sqrt();
+            (moves as f64 / 400.0, rms)
+        };
+        let (moves, rms) = (0..50).map(of_seed).unzip();
+        let (moves, rms) = (spread(moves), spread(rms));
+        println!("delay {delay}: τ moves in {moves:.3?} of the frames, the expected cost is off by {rms:.3?}");
+        assert!(moves[1] < 0.2 && rms[1] < 0.1, "{moves:?} {rms:?}");
+    }
+}
+
+/// It begins half a factor e beside the target, so that it meets the slope, which it takes for a common one at first.
+#[test]
+fn slopes_up_to_ten_thousand_are_held_once_they_are_known() {
+    for (slope, delay) in [10.0, 100.0, 1e3, 1e4].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
+        for factor in [1.5, 3.0, 1.0 / 1.5, 1.0 / 3.0] {
+            let load = Load { curve: &power(slope), factor: &step(factor), delay, noise: 0.0, seed: 0 };
+            let first_px = (-0.5 / slope).exp();
+            let frames = load.fly(Target::Triangles(COST), first_px, 160);
+            let after = &frames[EVENT..];
+            let (found, overshoot, settling) =
+                (settling(&frames[..EVENT], 0.05), overshoot(&after[delay..]), settling(after, 0.05));
+            println!(
+                "slope {slope}, delay {delay}, load × {factor:.2}: found in {found} frames, then {overshoot:.2} {settling}"
+            );
+            assert!(
+                found <= 15 * delay && overshoot <= 0.2 && settling <= 15,
+                "slope {slope}, delay {delay}, × {factor}"
+            );
+        }
+    }
+}
+
+/// Where the target lies between two stairs, the cheap one is taken, close to the edge, and kept.
+#[test]
+fn on_stairs_it_rests_on_the_cheap_side() {
+    let stairs = |px: f64| 0.7 * COST * 4f64.powf(-(px.log2() / 2.0).floor());
+    for (delay, noise, first_px) in [1, 2, 3].into_iter().flat_map(|d| [(d, 0.0, 7.0), (d, 0.0, 0.3), (d, 0.3, 7.0)]) {
+        let load = Load { curve: &stairs, factor: &constant, delay, noise, seed: 5 };
+        let target = if noise > 0.0 { Target::FrameMs(COST) } else { Target::Triangles(COST) };
+        let frames = load.fly(target, first_px, 400);
+        let rested = frames.iter().rposition(|frame| frame.cost > 1.0).unwrap_or(0);
+        let dear = frames.iter().filter(|frame| frame.cost > 1.0).count();
+        let last = frames[399];
+        println!("delay {delay}, noise {noise}: {dear} dear frames, the last one {rested}; {last:?}");
+        let limit = if noise > 0.0 { 300 } else { 120 };
+        assert!(rested < limit && last.cost == 0.7 && last.px < 1.1, "delay {delay}, noise {noise}: {rested} {last:?}");
+    }
+}
+
+#[test]
+fn a_single_slow_frame_moves_nothing() {
+    for (delay, spike) in [1, 2, 3].into_iter().flat_map(|d| [(d, 5.0), (d, 0.2)]) {
+        let factor = |k: usize| if k == EVENT { spike } else { 1.0 };
+        let load = Load { curve: &power(1.5), factor: &factor, delay, noise: 0.0, seed: 0 };
+        let frames = load.fly(Target::Triangles(COST), 1.0, 100);
+        assert!(frames.iter().all(|frame| frame.px == frames[EVENT].px), "delay {delay}, × {spike}");
+    }
+}
+
+/// Where nothing can be done, nothing builds up: when the load is back, so is the tolerance.
+#[test]
+fn it_does_not_wind_up_at_the_ends() {
+    for (delay, factor) in [1, 2, 3].into_iter().flat_map(|d| [(d, 1e4), (d, 1e-4)]) {
+        let load = |k: usize| if (EVENT..3 * EVENT).contains(&k) { factor } else { 1.0 };
+        let load = Load { curve: &power(1.0), factor: &load, delay, noise: 0.0, seed: 0 };
+        let frames = load.fly(Target::Triangles(COST), 1.0, 300);
+        let end = frames[3 * EVENT - 1].px;
+        let expected = if factor > 1.0 { RANGE_PX[1] } else { RANGE_PX[0] };
+        assert!((end / expected - 1.0).abs() < 1e-9, "delay {delay}, × {factor}: {end} px");
+        let back = settling(&frames[3 * EVENT..], 0.05);
+        assert!(back <= 15, "delay {delay}, × {factor}: back after {back} frames");
+        assert!(frames.iter().all(|frame| (RANGE_PX[0] * 0.999_999..=RANGE_PX[1] * 1.000_001).contains(&frame.px)));
+    }
+}
+
+#[test]
+fn slow_changes_are_followed() {
+    for delay in [1, 2, 3] {
+        let ramp = |k: usize| 1.02f64.powi(k.clamp(EVENT, 2 * EVENT) as i32 - EVENT as i32);
+        let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
+        for (name, factor) in [("ramp", &ramp as &dyn Fn(usize) -> f64), ("swing", &swing)] {
+            let load = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 };
+            let frames = load.fly(Target::Triangles(COST), 1.0, 240);
+            let worst = frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max);
+            println!("delay {delay}, {name}: {worst:.3}");
+            // What changes in the frames until it is known: 2 % a frame, and 0.3 · 2π / 40 = 4.7 %.
+            let limit = if name == "ramp" { 0.03 } else { 0.055 } * (delay as f64 + 1.0);
+            assert!(worst <= limit, "delay {delay}, {name}: {worst}");
+        }
+    }
+}
+
+/// A load that falls while τ moves leaves what was too dear at finer levels behind: it must not hold τ back.
+#[test]
+fn slow_first_frames_do_not_hold_it_back() {
+    let curve = |px: f64| 0.36 * COST + 2.3 * COST / (1.0 + px);
+    for delay in [1, 2, 3] {
+        let factor = |k: usize| if k < 3 { 10.0 } else { 1.0 };
+        let load = Load { curve: &curve, factor: &factor, delay, noise: 0.04, seed: 3 };
+        let frames = load.fly(Target::FrameMs(COST), 0.5, 120);
+        let settled = settling(&frames[3..], 0.1);
+        println!("delay {delay}: settled in {settled} frames");
+        assert!(settled <= 60, "delay {delay}: {settled}");
+    }
+}
