@@ -17,3 +17,5 @@ layout(constant_id = 7) const bool MORPH = false;
 layout(constant_id = 8) const bool SKIRTS = false;
 // They do so by their own distance.
 layout(constant_id = 10) const bool DISTANCE = false;
+// The field repeats after powers of two of samples.
+layout(constant_id = 11) const bool MASKED = false;

@@ -3,7 +3,7 @@
 
 // Layer and texel of a lattice position inside the field.
 ivec3 texel(ivec2 at) {
-    if (TILED) at %= frame.stored;
+    if (TILED) at = MASKED ? at & (frame.stored - 1) : at % frame.stored;
     if (PAGE_SHIFT == 0) return ivec3(at, 0);
     int side = 1 << PAGE_SHIFT;
     int pages = (frame.stored.x + side - 1) >> PAGE_SHIFT;

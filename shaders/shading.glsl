@@ -49,10 +49,7 @@ float true_height(Cell cell) {
 
 float linear_height(vec2 lattice) {
     if (FILTERED) {
-        ivec2 anchor = frame.anchor;
-        // Far away a float has no parts of samples left: back by whole repetitions.
-        if (TILED) anchor -= anchor / frame.stored * frame.stored * ivec2(greaterThan(abs(anchor), ivec2(4096)));
-        vec2 uv = (lattice + vec2(anchor) + 0.5) / vec2(frame.stored);
+        vec2 uv = (lattice + vec2(frame.anchor_stored) + 0.5) / vec2(frame.stored);
         float stored = textureLod(height_pages, vec3(uv, 0.0), 0.0).r;
         return CODED ? (stored * 65535.0 - frame.height_zero) * frame.height_scale : stored;
     }

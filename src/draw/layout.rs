@@ -64,6 +64,8 @@ shared! {
         last: ivec2,
         /// Samples stored (x, z): a tiled field repeats after them.
         stored: ivec2,
+        /// The anchor, where it is far away back by whole repetitions: there a float has no parts of samples left.
+        anchor_stored: ivec2,
         /// Height = (stored code − zero) · scale, metres.
         height_zero: float,
         /// See `height_zero`.

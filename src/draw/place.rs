@@ -52,11 +52,18 @@ impl Frame {
             spacing: field.spacing.map(|s| s as f32),
             last: field.size().map(|n| n as i32 - 1),
             stored: field.stored().map(|n| n as i32),
+            anchor_stored: [0, 1].map(|k| repeated(field, anchor.at[k], k)),
             height_zero,
             height_scale,
             ..Frame::default()
         }
     }
+}
+
+/// A place along an axis, back by whole repetitions of a tiled field if it is far away.
+fn repeated(field: &Field, at: i32, axis: usize) -> i32 {
+    const FAR: u32 = 4096;
+    if field.is_tiled() && at.unsigned_abs() > FAR { at % field.stored()[axis] as i32 } else { at }
 }
 
 /// A lattice vertex where it is drawn.

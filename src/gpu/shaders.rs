@@ -60,6 +60,7 @@ impl Constants {
             flag(plan.skirts),
             flag(plan.detail),
             flag(plan.morph == Morph::ByDistance),
+            flag(plan.stored.iter().all(|n| n.is_power_of_two())),
         ])
     }
 

@@ -94,12 +94,17 @@ pub enum Form {
     Linear,
 }
 
+/// The marker of a style: another one whenever the colours begin again.
+fn marker(style: usize) -> &'static str {
+    MARKERS[(style + style / COLOURS.len()) % MARKERS.len()]
+}
+
 /// The marker of a style, for legends.
 pub fn swatch(style: usize) -> String {
     let k = style % COLOURS.len();
     format!(
         "<svg class=\"swatch s{k}\" viewBox=\"-7 -7 14 14\" aria-hidden=\"true\"><path d=\"{}\"/></svg>",
-        MARKERS[k]
+        marker(style)
     )
 }
 
@@ -243,12 +248,12 @@ impl Frame {
             escape(&series.name)
         );
         for point in &series.points {
-            svg += &self.point(point, k);
+            svg += &self.point(point, marker(series.style));
         }
         svg + "</g>"
     }
 
-    fn point(&self, point: &Point, k: usize) -> String {
+    fn point(&self, point: &Point, marker: &str) -> String {
         let (x, y) = (self.x(point.x), self.y(point.y));
         let label = escape(&point.label);
         let whisker = point.interval.map_or(String::new(), |[low, high]| {
@@ -262,8 +267,8 @@ impl Frame {
         let ring = if point.marked { "<circle class=\"ring\" r=\"8\"/>" } else { "" };
         format!(
             "{whisker}<g class=\"point\" tabindex=\"0\" role=\"img\" aria-label=\"{label}\" data-x=\"{}\" data-y=\"{}\" \
-             transform=\"translate({x:.1} {y:.1})\"><circle class=\"touch\" r=\"11\"/>{ring}<path d=\"{}\"/></g>",
-            point.x, point.y, MARKERS[k]
+             transform=\"translate({x:.1} {y:.1})\"><circle class=\"touch\" r=\"11\"/>{ring}<path d=\"{marker}\"/></g>",
+            point.x, point.y
         )
     }
 }
@@ -274,7 +279,7 @@ pub fn legend_line(line: usize, style: usize, name: &str) -> String {
     format!(
         "<g class=\"series s{k}\" transform=\"translate(6 {})\"><path d=\"{}\"/><text x=\"12\" y=\"4\">{}</text></g>",
         LEGEND * line as f64,
-        MARKERS[k],
+        marker(style),
         escape(name)
     )
 }

@@ -8,7 +8,7 @@ use cuesta::draw::skirts::{self, is_skirted};
 use cuesta::draw::{DrawList, Instance, Morph, Seams};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
-use cuesta::height::Field;
+use cuesta::height::{Field, synth};
 use cuesta::plan::{Look, ScenePlan};
 use cuesta::view::View;
 
@@ -130,6 +130,8 @@ fn vertices_lie_where_the_cpu_says_to_the_bit() {
         far.spacing = [0.3, 31.7];
         compare(gpu, "far, narrow cells", &Arc::new(far), 0);
         compare(gpu, "tiled", &Arc::new((*coded).clone().tiled([3, 2])), 0);
+        let powers = synth::synth(synth::Kind::Fractal, [64, 32], 3).tiled([3, 5]);
+        compare(gpu, "tiled by powers of two", &Arc::new(powers), 0);
         compare(gpu, "tiled pages", &Arc::new((*coded).clone().tiled([3, 2])), 6);
     });
 }
