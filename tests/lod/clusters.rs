@@ -117,6 +117,32 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
     assert!(clusters * 3 < blocks, "{clusters} clusters for {blocks} blocks");
 }
 
+/// Land so gentle that distance alone tells the levels: many meet in one view.
+#[test]
+fn by_distance_levels_meet_without_a_crack_and_within_the_tolerance() {
+    let (mut seed, mut meeting) = (23, 0);
+    for k in 0..4 {
+        let size = [[257, 257], [257, 200], [230, 257], [129, 257]][k];
+        let rough = synth(Kind::Fractal, size, 7 + k as u64);
+        let heights = (0..(size[0] * size[1]) as usize).map(|k| 0.01 * rough.samples().height(k)).collect();
+        let field = Arc::new(Field::new(Samples::F32(heights), size, [3.0, 2.0], Holes::none(0)));
+        let settings = ["block=8", "morph=distance"];
+        let mut modes = ["clusters", "clusters:draw-per-block"].map(|mode| technique(&field, mode, &settings));
+        for _ in 0..20 {
+            let view = anywhere(&field, &mut seed);
+            let [(clusters, list), (blocks, _)] = modes.each_mut().map(|mode| drawn(&field, mode.as_mut(), &view));
+            assert!(clusters == blocks, "draw-per-block draws other triangles");
+            let proof = watertight::prove_list(&field, &view, Seams::Shared, modes[0].resident(), &list);
+            proof.unwrap_or_else(|why| panic!("{size:?}: {why}"));
+            let errors = geometric::errors(&field, &view, modes[0].resident(), &list);
+            assert!(errors.screen_px.max <= view.tolerance.px * (1.0 + 1e-9), "{size:?} at {:?}", errors.screen_at);
+            meeting += usize::from(list.levels().iter().filter(|count| **count > 0).count() > 1);
+        }
+    }
+    println!("levels meet in {meeting} of 80 views");
+    assert!(meeting > 20, "levels meet in {meeting} of 80 views only");
+}
+
 #[test]
 fn every_frame_of_skim_and_circle_is_drawn_alike_in_every_mode() {
     let mut field = synth(Kind::Eroded, [513, 513], 7);
