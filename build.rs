@@ -42,8 +42,12 @@ mod shaders {
         &[("vert", ShaderKind::Vertex), ("frag", ShaderKind::Fragment), ("comp", ShaderKind::Compute)];
 
     /// Shaders compiled a second time with a macro defined: source, macro, name of the variant.
-    const VARIANTS: &[(&str, &str, &str)] =
-        &[("lattice.vert", "CAPTURE", "lattice.capture.vert"), ("explicit.vert", "CAPTURE", "explicit.capture.vert")];
+    const VARIANTS: &[(&str, &str, &str)] = &[
+        ("lattice.vert", "CAPTURE", "lattice.capture.vert"),
+        ("explicit.vert", "CAPTURE", "explicit.capture.vert"),
+        ("explicit.vert", "NORMALS", "explicit.normals.vert"),
+        ("terrain.frag", "NORMALS", "terrain.normals.frag"),
+    ];
 
     pub fn compile_all() {
         println!("cargo:rerun-if-changed=shaders");

@@ -12,10 +12,17 @@ layout(location = 2) in float in_target;
 layout(location = 3) in float in_further;
 layout(location = 4) in float in_morph;
 layout(location = 5) in uint in_regions;
+#ifdef NORMALS
+layout(location = 6) in uvec3 in_normals;
+layout(location = 3) out vec3 out_normal;
+#endif
 
 void main() {
     Instance instance = instance_attributes();
     ivec2 at = lattice_position(instance, turned_position(instance, in_position));
     ExplicitVertex vertex = ExplicitVertex(in_position, in_height, in_target, in_further, in_morph, in_regions);
     emit_vertex(at, explicit_height(instance, vertex), instance.level, instance.batch);
+#ifdef NORMALS
+    out_normal = explicit_normal(instance, vertex, VertexNormals(in_normals.x, in_normals.y, in_normals.z));
+#endif
 }

@@ -7,10 +7,12 @@
 layout(local_size_x = 64) in;
 
 // A vertex and the instance it is placed by.
-struct Query { ExplicitVertex vertex; Instance instance; uint explicit_height; };
+struct Query { ExplicitVertex vertex; VertexNormals normals; Instance instance; uint explicit_height; };
+
+struct Answer { vec3 position; vec3 normal; };
 
 layout(set = 0, binding = 2, scalar) readonly buffer Queries { Query queries[]; };
-layout(set = 0, binding = 3, scalar) writeonly buffer Answers { vec3 answers[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer Answers { Answer answers[]; };
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
@@ -19,10 +21,11 @@ void main() {
     ExplicitVertex vertex = query.vertex;
     if (query.explicit_height == 0) {
         Placed placed = placed(query.instance, vertex.position);
-        answers[k] = relative_position(placed.at, placed.height);
+        answers[k] = Answer(relative_position(placed.at, placed.height), vec3(0.0));
     } else {
         float height = explicit_height(query.instance, vertex);
         ivec2 turned = turned_position(query.instance, vertex.position);
-        answers[k] = relative_position(lattice_position(query.instance, turned), height);
+        vec3 position = relative_position(lattice_position(query.instance, turned), height);
+        answers[k] = Answer(position, explicit_normal(query.instance, vertex, query.normals));
     }
 }

@@ -181,12 +181,30 @@ float region_weight(Instance instance, uint region) {
     return unit_weight(clamp(weight, stage * ONE, (stage + 1) * ONE) - stage * ONE);
 }
 
-float explicit_height(Instance instance, ExplicitVertex vertex) {
+vec2 explicit_weights(Instance instance, ExplicitVertex vertex) {
     uint region = vertex.regions & 255;
-    if (region == 0) return morphed_height(vertex.height, vertex.target, vertex.morph);
-    float weight = region_weight(instance, (vertex.regions >> 8) & 255);
-    float target = morphed_height(vertex.target, vertex.further, weight);
-    return morphed_height(vertex.height, target, region_weight(instance, region));
+    if (region == 0) return vec2(vertex.morph, 0.0);
+    return vec2(region_weight(instance, region), region_weight(instance, (vertex.regions >> 8) & 255));
+}
+
+float explicit_height(Instance instance, ExplicitVertex vertex) {
+    vec2 weights = explicit_weights(instance, vertex);
+    float target = morphed_height(vertex.target, vertex.further, weights.y);
+    return morphed_height(vertex.height, target, weights.x);
+}
+
+// Normals of vertices: src/draw/normals.rs.
+vec3 unpack_normal(uint packed) {
+    vec2 plan = unpackSnorm2x16(packed);
+    return vec3(plan.x, sqrt(max(1.0 - dot(plan, plan), 0.0)), plan.y);
+}
+
+vec3 explicit_normal(Instance instance, ExplicitVertex vertex, VertexNormals normals) {
+    vec2 weights = explicit_weights(instance, vertex);
+    vec3 target = mix(unpack_normal(normals.target), unpack_normal(normals.further), weights.y);
+    vec3 mean = mix(unpack_normal(normals.normal), target, weights.x);
+    // None points down: their mean is not zero, unless two are level and opposite.
+    return dot(mean, mean) > 0.0 ? normalize(mean) : vec3(0.0, 1.0, 0.0);
 }
 
 // Meshes with skirts: src/draw/skirts.rs.

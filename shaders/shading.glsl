@@ -108,12 +108,16 @@ bool is_open(vec2 lattice) {
     return HOLES && in_hole(cell_at(lattice));
 }
 
+// Size of a pixel at a point relative to the eye, metres.
+float pixel_at(vec3 relative) {
+    return frame.pixel_slope * length(relative) + frame.pixel_size;
+}
+
 // Colour of the surface at a point relative to the eye over a lattice position relative to the anchor.
-vec3 land_colour(vec3 relative, vec2 lattice, uvec2 level_batch) {
+vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
     Cell cell = cell_at(lattice);
     float distance = length(relative);
-    float pixel = frame.pixel_slope * distance + frame.pixel_size;
-    vec3 normal = normal_at(lattice, pixel);
+    float pixel = pixel_at(relative);
     float height = (relative.y - frame.anchor_height_relative) + frame.anchor_height;
 
     vec3 albedo;

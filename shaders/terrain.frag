@@ -10,11 +10,19 @@
 layout(location = 0) in vec3 in_relative;
 layout(location = 1) in vec2 in_lattice;
 layout(location = 2) flat in uvec2 in_level_batch;
+#ifdef NORMALS
+layout(location = 3) in vec3 in_normal;
+#endif
 layout(location = 0) out vec4 out_colour;
 
 void main() {
     if (is_open(in_lattice)) discard;
     // Alpha tells a skirt from the surface.
     bool is_skirt = SKIRTS && (in_level_batch.x & SKIRT) != 0;
-    out_colour = vec4(land_colour(in_relative, in_lattice, in_level_batch), is_skirt ? 0.5 : 1.0);
+#ifdef NORMALS
+    vec3 normal = normalize(in_normal);
+#else
+    vec3 normal = normal_at(in_lattice, pixel_at(in_relative));
+#endif
+    out_colour = vec4(land_colour(in_relative, in_lattice, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
 }

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::draw::layout::Frame;
-use crate::draw::{Morph, Seams};
+use crate::draw::{Manner, Morph, Normals, Seams};
 use crate::height::{Field, Samples};
 use crate::texture::detail;
 use crate::view::{Lens, View};
@@ -81,10 +81,8 @@ pub struct ScenePlan {
     pub page_shift: u32,
     /// Normals filter heights with the device's sampler.
     pub filtered: bool,
-    /// How lattice vertices move: to the next coarser level, or onto coarser sides.
-    pub morph: Morph,
-    /// Lattice meshes have skirts.
-    pub skirts: bool,
+    /// What the technique's lists ask for.
+    pub manner: Manner,
     /// The ground's materials are there, and looked up.
     pub detail: bool,
     /// Timestamps and pipeline statistics are taken.
@@ -118,8 +116,7 @@ impl ScenePlan {
             wireframe: look.wireframe,
             page_shift,
             filtered: device.filters_heights && page_shift == 0,
-            morph: Morph::No,
-            skirts: false,
+            manner: Manner::default(),
             detail: look.detail,
             measured: true,
             stored,
@@ -137,14 +134,9 @@ impl ScenePlan {
         Ok(plan)
     }
 
-    /// The plan for a technique whose lattice vertices move like this.
-    pub fn with_morph(self, morph: Morph) -> Self {
-        Self { morph, ..self }
-    }
-
-    /// The plan for a technique whose meshes meet like this.
-    pub fn with_seams(self, seams: Seams) -> Self {
-        Self { skirts: seams == Seams::Skirts, ..self }
+    /// The plan for a technique whose lists ask for this.
+    pub fn with_manner(self, manner: Manner) -> Self {
+        Self { manner, ..self }
     }
 
     /// Texels of a page of the height texture (x, z).
@@ -188,13 +180,26 @@ impl ScenePlan {
             sort(self.page_shift > 0, "height pages", "the field exceeds one image", "one image holds the field", 0),
             sort(!self.filtered, "filtering in the shader", "the device cannot", "the device's sampler does it", 0),
             sort(
-                self.morph != Morph::No,
+                self.manner.morph != Morph::No,
                 "vertex weights",
                 "lattice vertices morph or fall onto coarser sides",
                 "no lattice vertex moves",
                 0,
             ),
-            sort(self.skirts, "skirts", "meshes have edges of their own", "meshes share their edges", 0),
+            sort(
+                self.manner.seams == Seams::Skirts,
+                "skirts",
+                "meshes have edges of their own",
+                "meshes share their edges",
+                0,
+            ),
+            sort(
+                self.manner.normals == Normals::Vertices,
+                "vertex normals",
+                "vertices carry what lights them",
+                "the height texture lights each pixel",
+                0,
+            ),
             sort(self.fog, "fog", "asked for", "density 0", 0),
             sort(self.detail, "detail textures", "asked for", "the ground is not looked at from near", detail::bytes()),
             sort(overlay, "overlay", "asked for", "no picture is laid over", 0),

@@ -43,7 +43,7 @@ impl DeviceLaboratory {
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_morph(technique.morph()).with_seams(technique.seams()))
+        Ok(plan.with_manner(technique.manner()))
     }
 
     /// A technique as it is when just made, and its stage.
@@ -127,7 +127,8 @@ impl Laboratory for DeviceLaboratory {
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().into_iter().map(|(purpose, n)| (purpose.to_string(), n)).collect();
-        Ok(Timed { frames, device_bytes })
+        let figures = technique.figures().into_iter().map(|(name, value, _)| (name.to_string(), value)).collect();
+        Ok(Timed { frames, device_bytes, figures })
     }
 
     fn measure(&mut self, scene: &Scene) -> Result<Errors> {
@@ -191,7 +192,7 @@ fn look(
         let same = |(there, here): (&Vec<AsDrawn>, &Vec<Drawn>)| there.iter().map(|t| t.drawn).eq(here.iter().copied());
         pool.captured(captured.iter().zip(&expanded).all(same));
     }
-    pool.proof(frame, watertight::prove_list(field, view, technique.seams(), resident, &stage.list));
+    pool.proof(frame, watertight::prove_list(field, view, technique.manner().seams, resident, &stage.list));
     let is_kept = stage.list.widening == 1.0;
     let errors = geometric::errors(field, view, resident, &stage.list);
     pool.errors(frame, &errors, is_kept.then_some(view.tolerance.px));

@@ -1,5 +1,6 @@
 //! `results.json` and `results.csv`: the rows of a directory, summed up case by case.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -88,6 +89,9 @@ pub struct TimeSummary {
     pub held: Option<Held>,
     /// Device bytes, all purposes together.
     pub device_bytes: u64,
+    /// What the technique told of itself, by name.
+    #[serde(default)]
+    pub figures: BTreeMap<String, f64>,
 }
 
 impl Results {
@@ -185,6 +189,7 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         widening: rounds.iter().map(|r| r.widening).fold(1.0, f64::max),
         held: Held::median(&rounds.iter().filter_map(|r| r.held).collect::<Vec<_>>()),
         device_bytes: rounds.iter().map(|r| r.device_bytes.values().sum()).max().unwrap_or(0),
+        figures: rounds.last().map(|r| r.figures.clone()).unwrap_or_default(),
     })
 }
 

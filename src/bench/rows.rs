@@ -190,6 +190,9 @@ pub struct Times {
     pub tolerances_px: Vec<f64>,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
+    /// What the technique told of itself after the last frame, by name.
+    #[serde(default)]
+    pub figures: BTreeMap<String, f64>,
     /// The most memory that the process has held, bytes.
     pub host_bytes: Option<u64>,
 }

@@ -72,6 +72,8 @@ pub struct Timed {
     pub frames: Vec<Frame>,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
+    /// What the technique tells of itself at the end, by name.
+    pub figures: BTreeMap<String, f64>,
 }
 
 /// Whoever draws. A laboratory may keep what it made for a scene; it is called for the scenes in turn.
@@ -268,6 +270,7 @@ impl Times {
             held: goal.map(|goal| Held::of(goal, frames)),
             tolerances_px: frames.iter().filter(|_| goal.is_some()).map(|frame| frame.tolerance_px).collect(),
             device_bytes: timed.device_bytes,
+            figures: timed.figures,
             host_bytes: host_bytes(),
         }
     }

@@ -111,7 +111,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     let (entry, _) = args.technique.settings()?;
     let field = std::sync::Arc::new(loaded.field);
     let technique = args.technique.build(common, &field)?;
-    let (kept, left_out) = plan.with_morph(technique.morph()).with_seams(technique.seams()).decisions(&field);
+    let (kept, left_out) = plan.with_manner(technique.manner()).decisions(&field);
     let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
     report::print(common, &Plan { technique: entry.name, kept, left_out, figures })?;
     Ok(Outcome::Done)

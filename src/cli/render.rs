@@ -137,7 +137,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
+    let plan = plan.with_manner(technique.manner());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
     save(&args.output, &shot.picture)?;
@@ -188,7 +188,7 @@ pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
 
 fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -> Result<Measured> {
     let errors = geometric::errors(scene.field, view, technique.resident(), &shot.list);
-    let proof = watertight::prove_list(scene.field, view, technique.seams(), technique.resident(), &shot.list);
+    let proof = watertight::prove_list(scene.field, view, technique.manner().seams, technique.resident(), &shot.list);
     let holes = Truth::new(scene, view)?.hole_pixels(view, &shot.picture);
     let (width, frame) = (view.size[0] as usize, Frame::placing(scene.field, view));
     Ok(Measured {

@@ -127,6 +127,16 @@ shared! {
         regions: uint,
     }
 
+    /// Unit normals of an explicit vertex, each packed as `draw::normals::pack` says.
+    struct VertexNormals {
+        /// Of the finer shape.
+        normal: uint,
+        /// Of the coarser shape.
+        target: uint,
+        /// Of that to which the target goes itself.
+        further: uint,
+    }
+
     /// What the vertex program made of a vertex, when it is captured.
     struct Captured {
         /// Lattice position (finest samples).

@@ -4,6 +4,7 @@ pub mod distance;
 pub mod driver;
 pub mod expand;
 pub mod layout;
+pub mod normals;
 pub mod place;
 pub mod skirts;
 pub mod weights;
@@ -11,7 +12,8 @@ pub mod weights;
 use std::ops::Range;
 
 pub use driver::Driver;
-pub use layout::{ExplicitVertex, Instance, LatticeVertex};
+pub use layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
+pub use normals::Normals;
 
 /// What a draw's indices address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -40,6 +42,8 @@ pub struct Geometry {
     pub lattice: Vec<LatticeVertex>,
     /// Vertices with heights, for [`Source::Resident`] and [`Source::Streamed`].
     pub vertices: Vec<ExplicitVertex>,
+    /// Normals of the resident vertices, one each, where they are lit by them; else none.
+    pub normals: Vec<VertexNormals>,
     /// Indices into one of the two, as the draw's source says.
     pub indices: Vec<u32>,
 }
@@ -64,6 +68,8 @@ pub struct Draw {
 pub enum Upload {
     /// Overwrites resident explicit vertices from the given one on.
     Vertices(u32, Vec<ExplicitVertex>),
+    /// Overwrites normals of resident vertices from the given one on.
+    Normals(u32, Vec<VertexNormals>),
     /// Overwrites resident indices from the given one on.
     Indices(u32, Vec<u32>),
 }
@@ -88,6 +94,17 @@ pub enum Seams {
     Shared,
     /// Each has edges of its own, and the skirt that hangs from the higher one reaches down to the lower one.
     Skirts,
+}
+
+/// What a technique's lists ask of the programs that draw them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Manner {
+    /// How lattice vertices move.
+    pub morph: Morph,
+    /// How meshes meet: which of the two proofs lists pass ([`watertight`](crate::measure::watertight)).
+    pub seams: Seams,
+    /// Where normals come from.
+    pub normals: Normals,
 }
 
 /// How draws reach the device; the triangles are the same.
@@ -250,6 +267,7 @@ impl DrawList {
     pub fn size(&self) -> Limits {
         let bytes = |upload: &Upload| match upload {
             Upload::Vertices(_, v) => size_of_val(v.as_slice()),
+            Upload::Normals(_, n) => size_of_val(n.as_slice()),
             Upload::Indices(_, i) => size_of_val(i.as_slice()),
         };
         Limits {

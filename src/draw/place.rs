@@ -250,16 +250,20 @@ fn midpoint(a: f32, b: f32) -> f32 {
     (a + b) * 0.5
 }
 
-/// Height of a vertex that carries its own: its target goes on as far as the second region's weight says, and it goes
-/// to its target as far as the first one's, or its own, says.
-pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
+/// How far a vertex that carries its own height has gone to its target, and its target to where that goes: as the
+/// weights of its two regions say, or as it says itself.
+pub fn explicit_weights(instance: &Instance, vertex: &ExplicitVertex) -> [f32; 2] {
     let region = vertex.regions & 255;
     if region == 0 {
-        return morphed_height(vertex.height, vertex.target, vertex.morph);
+        return [vertex.morph, 0.0];
     }
-    let weight = |region: u32| unit_weight(region_weight(instance, region));
-    let target = morphed_height(vertex.target, vertex.further, weight(vertex.regions >> 8 & 255));
-    morphed_height(vertex.height, target, weight(region))
+    [region, vertex.regions >> 8 & 255].map(|region| unit_weight(region_weight(instance, region)))
+}
+
+/// Height of a vertex that carries its own.
+pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
+    let [weight, further] = explicit_weights(instance, vertex);
+    morphed_height(vertex.height, morphed_height(vertex.target, vertex.further, further), weight)
 }
 
 /// Position relative to the eye in metres, world axes, of a lattice position and height.

@@ -10,8 +10,8 @@ use ash::vk;
 use super::device::Gpu;
 use super::shaders::{self, Constants};
 use super::target::Formats;
-use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex};
-use crate::draw::{Source, Topology};
+use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
+use crate::draw::{Normals, Source, Topology};
 use crate::plan::ScenePlan;
 
 /// The pipelines of a scene, and the layout they share.
@@ -53,7 +53,9 @@ impl Pipelines {
         let mut pipelines =
             Self { gpu: Arc::clone(gpu), set_layout, layout, sky: vk::Pipeline::null(), terrain: BTreeMap::new() };
         pipelines.sky = pipelines.make_sky(formats)?;
-        for source in [Source::Lattice, Source::Resident] {
+        // Streamed geometry has no normals.
+        let streamed = (plan.manner.normals == Normals::Vertices).then_some(Source::Streamed);
+        for source in [Source::Lattice, Source::Resident].into_iter().chain(streamed) {
             for topology in [Topology::Triangles, Topology::Strip] {
                 let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
                 pipelines.terrain.insert((source, topology), pipeline);
@@ -62,10 +64,10 @@ impl Pipelines {
         Ok(pipelines)
     }
 
-    /// The pipeline that draws such draws. Resident and streamed geometry share one.
+    /// The pipeline that draws such draws. Resident and streamed geometry share one, if both are lit alike.
     pub fn terrain(&self, source: Source, topology: Topology) -> vk::Pipeline {
-        let source = if source == Source::Streamed { Source::Resident } else { source };
-        self.terrain[&(source, topology)]
+        let own = self.terrain.get(&(source, topology));
+        *own.unwrap_or_else(|| &self.terrain[&(Source::Resident, topology)])
     }
 
     fn make_sky(&self, formats: Formats) -> Result<vk::Pipeline> {
@@ -105,21 +107,30 @@ pub(super) fn terrain(
     topology: Topology,
 ) -> Result<vk::Pipeline> {
     let constants = Constants::of(plan);
-    let (stride, attributes) = vertex_input(source);
-    let bindings = [
+    let (stride, mut attributes) = vertex_input(source);
+    let mut bindings = vec![
         vk::VertexInputBindingDescription::default().binding(0).stride(stride),
         vk::VertexInputBindingDescription::default()
             .binding(1)
             .stride(size_of::<Instance>() as u32)
             .input_rate(vk::VertexInputRate::INSTANCE),
     ];
+    let has_normals = plan.manner.normals == Normals::Vertices && source == Source::Resident;
+    if has_normals && matches!(pass, Pass::Picture(_)) {
+        bindings
+            .push(vk::VertexInputBindingDescription::default().binding(2).stride(size_of::<VertexNormals>() as u32));
+        let format = vk::Format::R32G32B32_UINT;
+        attributes.push(vk::VertexInputAttributeDescription { location: 6, binding: 2, format, offset: 0 });
+    }
     let (name, [picture, capture]) = match source {
         Source::Lattice => ("lattice", ["lattice.vert", "lattice.capture.vert"]),
         Source::Resident | Source::Streamed => ("explicit", ["explicit.vert", "explicit.capture.vert"]),
     };
+    // Land is drawn first and hides; the far plane lies at depth 0.
+    let hides = Some((true, vk::CompareOp::GREATER));
     let (vertex, fragment, depth, formats) = match pass {
-        // Land is drawn first and hides; the far plane lies at depth 0.
-        Pass::Picture(formats) => (picture, Some("terrain.frag"), Some((true, vk::CompareOp::GREATER)), Some(formats)),
+        Pass::Picture(f) if has_normals => ("explicit.normals.vert", Some("terrain.normals.frag"), hides, Some(f)),
+        Pass::Picture(formats) => (picture, Some("terrain.frag"), hides, Some(formats)),
         Pass::Capture => (capture, None, None, None),
     };
     let description = Description {

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
-use crate::draw::Morph;
+use crate::draw::{Morph, Seams};
 use crate::plan::ScenePlan;
 
 /// File name of the source and SPIR-V of every shader (made by build.rs).
@@ -56,10 +56,10 @@ impl Constants {
             flag(plan.fog),
             plan.colour as u32,
             flag(plan.filtered),
-            flag(plan.morph != Morph::No),
-            flag(plan.skirts),
+            flag(plan.manner.morph != Morph::No),
+            flag(plan.manner.seams == Seams::Skirts),
             flag(plan.detail),
-            flag(plan.morph == Morph::ByDistance),
+            flag(plan.manner.morph == Morph::ByDistance),
             flag(plan.stored.iter().all(|n| n.is_power_of_two())),
         ])
     }

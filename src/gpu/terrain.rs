@@ -15,7 +15,7 @@ use super::memory::{Buffer, Image, memory_barrier};
 use super::pages::{self, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
-use crate::draw::layout::{ExplicitVertex, Frame, Instance};
+use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
 use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
 use crate::height::Field;
 use crate::plan::ScenePlan;
@@ -37,6 +37,7 @@ pub struct Terrain {
 struct Resident {
     lattice: Buffer,
     vertices: Buffer,
+    normals: Buffer,
     indices: Buffer,
 }
 
@@ -184,6 +185,9 @@ impl Terrain {
                 Upload::Vertices(first, v) => {
                     (cast_slice(v), &self.resident.vertices, *first as usize * size_of::<ExplicitVertex>())
                 }
+                Upload::Normals(first, n) => {
+                    (cast_slice(n), &self.resident.normals, *first as usize * size_of::<VertexNormals>())
+                }
                 Upload::Indices(first, i) => (cast_slice(i), &self.resident.indices, *first as usize * 4),
             };
             if bytes.is_empty() {
@@ -308,8 +312,8 @@ impl Terrain {
         };
         // SAFETY: the buffers live until the frame has ended.
         unsafe {
-            let buffers = [vertices.raw, slot.instances.raw];
-            self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0, 0]);
+            let buffers = [vertices.raw, slot.instances.raw, self.resident.normals.raw];
+            self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0; 3]);
             self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, vk::IndexType::UINT32);
         }
     }
@@ -337,6 +341,7 @@ impl Resident {
         Ok(Self {
             lattice: filled(gpu, "lattice vertices", cast_slice(&geometry.lattice), vertex)?,
             vertices: filled(gpu, "resident vertices", cast_slice(&geometry.vertices), vertex)?,
+            normals: filled(gpu, "vertex normals", cast_slice(&geometry.normals), vertex)?,
             indices: filled(gpu, "resident indices", cast_slice(&geometry.indices), index)?,
         })
     }

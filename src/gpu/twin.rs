@@ -13,7 +13,7 @@ use super::memory::{Buffer, memory_barrier};
 use super::pages::{self, Sampling};
 use super::pipelines;
 use super::shaders::Constants;
-use crate::draw::layout::{ExplicitVertex, Frame, Instance};
+use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
@@ -23,20 +23,32 @@ use crate::plan::ScenePlan;
 pub struct Query {
     /// The vertex; a lattice vertex has only a position.
     pub vertex: ExplicitVertex,
+    /// Its normals, if it carries its height.
+    pub normals: VertexNormals,
     /// Its instance.
     pub instance: Instance,
     /// Not 0: the vertex carries its height.
     pub explicit_height: u32,
 }
 
-/// Positions relative to the eye, metres, as the device computes them.
-pub fn positions(
+/// What the device makes of a vertex. Laid out as `Answer` in `shaders/position.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Answer {
+    /// Position relative to the eye, metres.
+    pub position: [f32; 3],
+    /// Unit normal, if the vertex carries its height.
+    pub normal: [f32; 3],
+}
+
+/// Positions and normals as the device computes them.
+pub fn answers(
     gpu: &Arc<Gpu>,
     plan: &ScenePlan,
     field: &Field,
     frame: &Frame,
     queries: &[Query],
-) -> Result<Vec<[f32; 3]>> {
+) -> Result<Vec<Answer>> {
     let heights = pages::heights(gpu, plan, field)?;
     let sampler = pages::sampler(gpu, Sampling::Texels)?;
     let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
@@ -44,7 +56,7 @@ pub fn positions(
     uniform.write(0, bytemuck::bytes_of(frame));
     let mut input = Buffer::host(gpu, "queries", size_of_val(queries) as u64, storage)?;
     input.write(0, bytemuck::cast_slice(queries));
-    let bytes = queries.len() * size_of::<[f32; 3]>();
+    let bytes = queries.len() * size_of::<Answer>();
     let output = Buffer::new(gpu, "answers", bytes as u64, storage, MemoryLocation::GpuToCpu)?;
     let bound = [
         Bound::Uniform(&uniform),

@@ -37,7 +37,7 @@ pub use sample::{Order, SampleType};
 use std::ops::Range;
 use std::path::PathBuf;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.
 #[derive(Debug, thiserror::Error)]
@@ -273,6 +273,21 @@ impl Field {
     /// World position of a lattice position and height.
     pub fn world_at(&self, i: f64, j: f64, height: f64) -> DVec3 {
         DVec3::new(self.origin[0] + i * self.spacing[0], height, self.origin[1] + j * self.spacing[1])
+    }
+
+    /// Unit normal at sample `(i, j)`, from the heights on both sides of it; at the field's edge from those that are
+    /// there.
+    pub fn normal(&self, i: u32, j: u32) -> Vec3 {
+        let last = self.size().map(|n| n - 1);
+        let around = |k: u32, axis: usize| [k.saturating_sub(1), (k + 1).min(last[axis])];
+        let slope = |heights: [f32; 2], samples: [u32; 2], axis: usize| {
+            let rise = f64::from(heights[0]) - f64::from(heights[1]);
+            rise / (f64::from(samples[1] - samples[0]) * self.spacing[axis])
+        };
+        let (x, z) = (around(i, 0), around(j, 1));
+        let east = slope(x.map(|i| self.height(i, j)), x, 0);
+        let south = slope(z.map(|j| self.height(i, j)), z, 1);
+        DVec3::new(east, 1.0, south).normalize_or(DVec3::Y).as_vec3()
     }
 
     /// Height bilinearly interpolated at a world position, or `None` outside or over a hole.

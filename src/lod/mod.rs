@@ -12,7 +12,7 @@ pub mod sorted_strips;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Morph, Seams, Submission};
+use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Manner, Submission};
 use crate::height::Field;
 use crate::view::View;
 pub use settings::{Setting, Settings, Values};
@@ -62,14 +62,9 @@ pub trait Technique: Send {
         true
     }
 
-    /// How its lattice vertices move.
-    fn morph(&self) -> Morph {
-        Morph::No
-    }
-
-    /// How its meshes meet: which of the two proofs its lists pass ([`watertight`](crate::measure::watertight)).
-    fn seams(&self) -> Seams {
-        Seams::Shared
+    /// What its lists ask of the programs that draw them.
+    fn manner(&self) -> Manner {
+        Manner::default()
     }
 
     /// What is worth knowing about the data it prepared: name, value, unit.

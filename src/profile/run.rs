@@ -93,7 +93,7 @@ pub fn run(
 }
 
 fn stage(scene: &Scene, form: &Form, view: &View) -> Result<Stage> {
-    let plan = scene.plan.clone().with_morph(form.technique.morph()).with_seams(form.technique.seams());
+    let plan = scene.plan.clone().with_manner(form.technique.manner());
     Scene { plan: &plan, ..scene.clone() }.stage(form.technique.as_ref(), view.size)
 }
 

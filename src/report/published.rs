@@ -50,6 +50,8 @@ pub struct Rule {
     path: Option<String>,
     /// Most that the 99th percentile of the peers' metric may be, pixels.
     peers_p99_px: Option<f64>,
+    /// What stands there is then also this figure that the technique told of itself.
+    figure: Option<String>,
     /// What stands there is then how many times as fast as a case of this rule it is, at the same tolerance in the same
     /// scene.
     over: Option<Box<Rule>>,
@@ -102,13 +104,16 @@ impl Rule {
     fn fastest(&self, results: &Results) -> Option<String> {
         let timed =
             results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)));
+        let timed = timed.filter(|(_, time)| self.figure.as_ref().is_none_or(|name| time.figures.contains_key(name)));
         let (result, time) = timed.min_by(|a, b| a.1.frame_ms.value.total_cmp(&b.1.frame_ms.value))?;
+        let figure =
+            self.figure.as_ref().map_or(String::new(), |name| format!("; {name}: {}", number(time.figures[name])));
         let frame_ms = time.frame_ms.value;
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
         let error = peers
             .map_or(String::new(), |p| format!("; peers' metric mean {}, p99 {} px", number(p.mean), number(p.p99)));
         Some(format!(
-            "{} {} px: {} ms ({} fps), {} triangles ({} a second), {} draws{error}",
+            "{} {} px: {} ms ({} fps), {} triangles ({} a second), {} draws{error}{figure}",
             result.case.series(),
             number(result.case.tolerance_px),
             number(frame_ms),

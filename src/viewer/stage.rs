@@ -71,7 +71,7 @@ pub struct Shown {
 /// What the scene needs.
 fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Result<ScenePlan> {
     let plan = ScenePlan::new(&setup.field, look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
-    Ok(plan.with_morph(technique.morph()).with_seams(technique.seams()))
+    Ok(plan.with_manner(technique.manner()))
 }
 
 impl Stage {

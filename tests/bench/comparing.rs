@@ -1,8 +1,6 @@
 //! Regressions in simulated times, as noisy as those of a software device on a shared machine: each time moves by up
 //! to 12 %, one in twenty by 38 %.
 
-use std::collections::BTreeMap;
-
 use cuesta::bench::compare::{THRESHOLD, compare};
 use cuesta::bench::results::Results;
 use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary, TimeRow, Within};
@@ -30,7 +28,7 @@ fn run(random: &mut fastrand::Rng, machine: Option<f64>, slower: impl Fn(&Case) 
             let frame_ms = 20.0 * slower(&case) * noise;
             let floor_ms = machine.map(|_| 7.0 * noise * (1.0 + 0.04 * (2.0 * random.f64() - 1.0)));
             let frame = Frame { frame_ms, floor_ms, triangles: 1000, ..Frame::default() };
-            let times = Times::of(round, Timed { frames: vec![frame; 8], device_bytes: BTreeMap::new() }, None);
+            let times = Times::of(round, Timed { frames: vec![frame; 8], ..Timed::default() }, None);
             rows.push(Row::Time(TimeRow { case: case.clone(), times }));
         }
         let errors = Errors {

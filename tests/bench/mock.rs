@@ -72,7 +72,8 @@ impl Laboratory for Mock {
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);
-        Ok(Timed { frames: (0..scene.views.len()).map(frame).collect(), device_bytes })
+        let figures = BTreeMap::from([("blocks".to_string(), 12.0)]);
+        Ok(Timed { frames: (0..scene.views.len()).map(frame).collect(), device_bytes, figures })
     }
 
     fn measure(&mut self, scene: &Scene) -> Result<Errors> {

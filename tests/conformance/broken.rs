@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Seams, Source, Topology, skirts};
+use cuesta::draw::{
+    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Seams, Source, Topology, skirts,
+};
 use cuesta::height::Field;
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
 use cuesta::lod::{self, Settings, Technique};
@@ -99,7 +101,7 @@ fn unbroken_it_keeps_the_laws() {
     for mut technique in whole {
         let mut subject = Subject { field, technique: &mut *technique, views: &cases::views(field), time_s: 0.0 };
         // Clusters have blocks of several levels.
-        let has_levels = subject.technique.seams() == Seams::Shared;
+        let has_levels = subject.technique.manner().seams == Seams::Shared;
         for law in LAWS.iter().filter(|law| has_levels || law.name != "neighbours within one level") {
             (law.check)(&mut subject).unwrap_or_else(|why| panic!("{}: {why}", law.name));
         }
@@ -170,8 +172,8 @@ impl Technique for Changed {
         self.inner.select(view, list);
         (self.change)(list);
     }
-    fn seams(&self) -> Seams {
-        self.seams
+    fn manner(&self) -> Manner {
+        Manner { seams: self.seams, ..Manner::default() }
     }
     fn keeps_tolerance(&self) -> bool {
         true

@@ -123,7 +123,7 @@ fn one_surface(subject: &mut Subject) -> Result<(), String> {
         let all_land = subject.field.holes().count() == 0 && cases::sees_everything(subject.field, view);
         // As it arrives, and once it has settled.
         [Subject::select_once, Subject::select].iter().try_for_each(|select| {
-            let (list, seams) = (select(subject, view), subject.technique.seams());
+            let (list, seams) = (select(subject, view), subject.technique.manner().seams);
             let proof = watertight::prove_list(subject.field, view, seams, subject.technique.resident(), &list)
                 .map_err(|why| why.to_string())?;
             ensure(!all_land || proof.doubled_area == whole, || format!("area {} of {whole}", proof.doubled_area))

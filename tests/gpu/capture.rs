@@ -19,10 +19,7 @@ use super::{as_f32, aslant, difference, mountains, on_device, technique};
 
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Stage {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_morph(technique.morph())
-        .with_seams(technique.seams());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
     let mut stage = Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, view.size).unwrap();
     stage.draw(technique, view, Copy::PictureAndDepth).unwrap();
     stage
@@ -40,7 +37,7 @@ fn assert_same(stage: &mut Stage, technique: &mut dyn Technique, field: &Arc<Fie
     let frame = Frame::placing(field, view);
     let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &stage.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
-    assert_eq!(expanded[1].is_empty(), technique.seams() == Seams::Shared, "{name}");
+    assert_eq!(expanded[1].is_empty(), technique.manner().seams == Seams::Shared, "{name}");
     let bits = |t: &expand::Drawn| (t.instance, t.corners.map(|c| (c.x, c.z, c.y.to_bits())));
     for (there, here) in captured.iter().flatten().zip(expanded.iter().flatten()) {
         assert_eq!(bits(&there.drawn), bits(here), "{name}: {there:?} {here:?}");

@@ -15,7 +15,7 @@ use super::{difference, on_device, technique};
 fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, detail: bool, view: &View) -> RgbaImage {
     let look = Look { detail, ..Look::default() };
     let mut technique = technique(field, "clusters", &["block=16"]);
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morph());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     scene.shoot(technique.as_mut(), view, 1).unwrap().picture
 }
@@ -84,7 +84,7 @@ fn memory_does_not_grow_with_the_tiling() {
             let view = view(field.world_at(300.0, 300.0, 2000.0), -30.0);
             let look = Look { detail: true, ..Look::default() };
             let mut technique = technique(&field, "clusters", &["block=16"]);
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap().with_morph(technique.morph());
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             scene.shoot(technique.as_mut(), &view, 1).unwrap().device_bytes
         });

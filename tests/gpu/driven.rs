@@ -34,7 +34,7 @@ fn set(list: &DrawList) -> Set {
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
+    let plan = plan.with_manner(technique.manner());
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
 }
 

@@ -18,19 +18,20 @@ const THRESHOLD: u8 = 5;
 const SHARE: f64 = 0.001;
 
 fn compare(gpu: &Arc<Gpu>, name: &str, colour: Colour, file: &str) {
-    compare_look(gpu, name, &Look { colour, ..Look::default() }, file);
+    compare_look(gpu, name, &[], &Look { colour, ..Look::default() }, file);
 }
 
-fn compare_look(gpu: &Arc<Gpu>, name: &str, look: &Look, file: &str) {
+fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file: &str) {
     let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
     let mut view = aslant(&field, [96, 64], 1.0);
     // Near the ground at one end, so that every level occurs.
     let statistics = field.statistics();
     view.eye = field.world_at(20.0, 270.0, f64::from(statistics.max) + 200.0);
     view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
-    let plan = ScenePlan::new(&field, look, &gpu.device_limits()).unwrap();
+    let mut technique = technique(&field, name, settings);
+    let plan = ScenePlan::new(&field, look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
     let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look, overlay: None };
-    let drawn = scene.shoot(technique(&field, name, &[]).as_mut(), &view, 1).unwrap().picture;
+    let drawn = scene.shoot(technique.as_mut(), &view, 1).unwrap().picture;
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{file}.png"));
     if std::env::var("UPDATE_GOLDEN").as_deref() == Ok("1") {
         drawn.save(&path).unwrap();
@@ -55,6 +56,8 @@ fn every_technique_looks_as_it_did() {
         compare(gpu, "geomipmap", Colour::Normal, "geomipmap-normal");
         compare(gpu, "geomipmap", Colour::Error, "geomipmap-error");
         let detail = Look { detail: true, sun_speed: 20.0, ..Look::default() };
-        compare_look(gpu, "geomipmap", &detail.after(3.0), "geomipmap-detail");
+        compare_look(gpu, "geomipmap", &[], &detail.after(3.0), "geomipmap-detail");
+        let normal = Look { colour: Colour::Normal, ..Look::default() };
+        compare_look(gpu, "smooth-tiles", &["normals=vertex"], &normal, "smooth-tiles-normal");
     });
 }

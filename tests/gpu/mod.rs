@@ -64,10 +64,7 @@ fn shoot_planned(
 
 /// The picture of a field with the default look.
 fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Shot {
-    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
-        .unwrap()
-        .with_morph(technique.morph())
-        .with_seams(technique.seams());
+    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_manner(technique.manner());
     shoot_planned(gpu, field, &plan, technique, view)
 }
 

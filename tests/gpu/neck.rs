@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Submission, Topology, Upload};
+use cuesta::draw::{
+    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Submission, Topology, Upload,
+    VertexNormals, normals,
+};
 use cuesta::height::{Field, rtin};
 use cuesta::lod::Technique;
 use cuesta::view::View;
@@ -13,6 +16,7 @@ use super::{aslant, mountains, on_device, shoot, technique};
 pub struct Explicit {
     mesh: Geometry,
     resident: Geometry,
+    normals: Vec<VertexNormals>,
     way: Way,
 }
 
@@ -24,6 +28,8 @@ pub enum Way {
     Uploaded,
     /// Streamed as one strip a row of cells.
     Strips,
+    /// Resident, lit by normals of its own that start as nonsense and are overwritten before it is drawn.
+    Lit,
 }
 
 impl Explicit {
@@ -59,9 +65,16 @@ impl Explicit {
                 indices: vec![0; mesh.indices.len()],
                 ..Geometry::default()
             },
+            Way::Lit => Geometry { normals: vec![VertexNormals::default(); mesh.vertices.len()], ..mesh.clone() },
             Way::Streamed | Way::Strips => Geometry::default(),
         };
-        Self { mesh, resident, way }
+        let of_vertex = |vertex: &ExplicitVertex| {
+            let [x, z] = vertex.position.map(|n| n as u32);
+            let normal = normals::pack(field.normal(x, z));
+            VertexNormals { normal, target: normal, further: 0 }
+        };
+        let normals = if way == Way::Lit { mesh.vertices.iter().map(of_vertex).collect() } else { Vec::new() };
+        Self { mesh, resident, normals, way }
     }
 }
 
@@ -72,6 +85,7 @@ impl Technique for Explicit {
 
     fn limits(&self) -> Limits {
         let bytes = size_of_val(self.mesh.vertices.as_slice()) + size_of_val(self.mesh.indices.as_slice());
+        let bytes = bytes.max(size_of_val(self.normals.as_slice()));
         Limits {
             draws: 1000,
             instances: 1,
@@ -84,7 +98,7 @@ impl Technique for Explicit {
     fn select(&mut self, _: &View, list: &mut DrawList) {
         list.instances.push(Instance::default());
         let (source, topology) = match self.way {
-            Way::Resident | Way::Uploaded => (Source::Resident, Topology::Triangles),
+            Way::Resident | Way::Uploaded | Way::Lit => (Source::Resident, Topology::Triangles),
             Way::Streamed => (Source::Streamed, Topology::Triangles),
             Way::Strips => (Source::Streamed, Topology::Strip),
         };
@@ -97,6 +111,9 @@ impl Technique for Explicit {
         if source == Source::Streamed {
             list.streamed = self.mesh.clone();
         }
+        if self.way == Way::Lit {
+            list.uploads.push(Upload::Normals(0, self.normals.clone()));
+        }
         if self.way == Way::Uploaded {
             list.uploads.push(Upload::Vertices(0, self.mesh.vertices.clone()));
             list.uploads.push(Upload::Indices(0, self.mesh.indices.clone()));
@@ -106,6 +123,11 @@ impl Technique for Explicit {
 
     fn keeps_tolerance(&self) -> bool {
         true
+    }
+
+    fn manner(&self) -> Manner {
+        let normals = if self.way == Way::Lit { Normals::Vertices } else { Normals::Texture };
+        Manner { normals, ..Manner::default() }
     }
 }
 
@@ -126,6 +148,19 @@ fn explicit_geometry_draws_what_the_lattice_draws() {
             let shot = shoot(gpu, &field, &mut Explicit::new(&field, way), &view);
             assert_eq!(shot.picture, truth.picture, "{way:?}");
         }
+    });
+}
+
+/// At vertices both lights are the same; between them one interpolates heights and the other normals.
+#[test]
+fn normals_of_vertices_light_the_land_as_the_texture_does() {
+    on_device(|gpu| {
+        let field = whole_metres();
+        let view = aslant(&field, [160, 120], 1.0);
+        let truth = shoot(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
+        let lit = shoot(gpu, &field, &mut Explicit::new(&field, Way::Lit), &view);
+        let (largest, share) = super::difference(&lit.picture, &truth.picture, 20);
+        assert!(largest > 0 && share < 0.02, "{largest}, {share}");
     });
 }
 

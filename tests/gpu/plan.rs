@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::Morph;
+use cuesta::draw::{Manner, Morph};
 use cuesta::height::Field;
 use cuesta::plan::{Colour, DeviceLimits, Look, ScenePlan};
 
@@ -27,7 +27,7 @@ fn forced_features_show_the_same_picture() {
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
         // Nobody says how far.
-        same("morphing", ScenePlan { morph: Morph::ByInstance, ..plan.clone() });
+        same("morphing", plan.clone().with_manner(Manner { morph: Morph::ByInstance, ..Manner::default() }));
         // The look's density is 0.
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, Morph, Seams, skirts};
+use cuesta::draw::{DrawList, Geometry, Limits, Manner, skirts};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -37,11 +37,8 @@ impl Technique for Deeper {
     fn keeps_tolerance(&self) -> bool {
         self.inner.keeps_tolerance()
     }
-    fn morph(&self) -> Morph {
-        self.inner.morph()
-    }
-    fn seams(&self) -> Seams {
-        self.inner.seams()
+    fn manner(&self) -> Manner {
+        self.inner.manner()
     }
 }
 
@@ -99,7 +96,7 @@ fn no_hole_pixels_on_any_field_of_the_laws() {
             let truths: Vec<_> = views.map(|(what, view)| (what, view, Truth::new(&scene, &view).unwrap())).collect();
             for morph in ["morph=off", "morph=on"] {
                 let mut technique = skirted(&field, morph, 1.0);
-                let plan = plan.clone().with_morph(technique.morph()).with_seams(technique.seams());
+                let plan = plan.clone().with_manner(technique.manner());
                 let mut stage = Scene { plan: &plan, ..scene.clone() }.stage(&technique, [320, 180]).unwrap();
                 for (what, view, truth) in &truths {
                     stage.draw(&mut technique, view, Copy::Picture).unwrap();

@@ -70,7 +70,7 @@ fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
 fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: &str, random: &mut Random) -> u64 {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_morph(technique.morph()).with_seams(technique.seams());
+    let plan = plan.with_manner(technique.manner());
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     let start = aslant(field, [160, 100], *random.one_of(&[1.0, 2.0, 8.0]));
     let mut stage = scene.stage(technique, start.size).unwrap();

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::layout::{ExplicitVertex, Frame};
+use cuesta::draw::layout::{ExplicitVertex, Frame, VertexNormals};
+use cuesta::draw::normals::explicit_normal;
 use cuesta::draw::place::{explicit_height, lattice_position, placed, relative_position, turned_position};
 use cuesta::draw::skirts::{self, is_skirted};
-use cuesta::draw::{DrawList, Instance, Morph, Seams};
+use cuesta::draw::{DrawList, Instance, Manner, Morph, Seams};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::twin::{self, Query};
 use cuesta::height::{Field, synth};
@@ -32,6 +33,7 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
         let morphing = Instance { weights, ..*instance };
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
+            normals: VertexNormals::default(),
             instance: if is_made_up { morphing } else { *instance },
             explicit_height: 0,
         })
@@ -65,6 +67,12 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             morph: k as f32 / 1999.0,
             // Of neither, of the vertex, of both.
             regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
+        },
+        // Steep and level ones too; y is what x and z leave.
+        normals: VertexNormals {
+            normal: k.wrapping_mul(0x9e37_79b1),
+            target: k.wrapping_mul(0x85eb_ca6b),
+            further: if k % 5 == 0 { 0 } else { k.wrapping_mul(0xc2b2_ae35) },
         },
         instance: Instance {
             origin: [5, 3],
@@ -100,21 +108,27 @@ fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
 fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph) {
     let view = aslant(field, [320, 200], 2.0);
     let frame = Frame::placing(field, &view);
-    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
-        .unwrap()
-        .with_morph(morph)
-        .with_seams(Seams::Skirts);
+    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_manner(Manner {
+        morph,
+        seams: Seams::Skirts,
+        ..Manner::default()
+    });
     plan.page_shift = page_shift;
     let queries = queries(field, &view, morph);
-    let device = twin::positions(gpu, &plan, field, &frame, &queries).unwrap();
+    let device = twin::answers(gpu, &plan, field, &frame, &queries).unwrap();
     for (query, there) in queries.iter().zip(device) {
         let here = on_the_cpu(field, &frame, query);
         assert_eq!(
             here.map(f32::to_bits),
-            there.map(f32::to_bits),
+            there.position.map(f32::to_bits),
             "{name}: {here:?} {there:?} {query:?}",
             query = query.vertex
         );
+        if query.explicit_height != 0 {
+            let normal = explicit_normal(&query.instance, &query.vertex, &query.normals);
+            let apart = normal.distance(there.normal.into());
+            assert!(apart < 1e-4, "{name}: {normal} {there:?} {normals:?}", normals = query.normals);
+        }
     }
 }
 

@@ -100,7 +100,7 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
                 kinds.extend(list.draws.iter().map(|draw| draw.indices.start));
             }
             for (mode, list) in modes.iter().zip([&list, &each, &single]) {
-                let proof = watertight::prove_list(&field, &view, mode.seams(), mode.resident(), list);
+                let proof = watertight::prove_list(&field, &view, mode.manner().seams, mode.resident(), list);
                 proof.unwrap_or_else(|why| panic!("{settings:?}: {why}"));
             }
             let errors = geometric::errors(&field, &view, modes[0].resident(), &list);

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use cuesta::bench::paths;
 use cuesta::draw::layout::Frame;
 use cuesta::draw::weights::{ONE, get, inside};
 use cuesta::draw::{DrawList, expand};
-use cuesta::height::{Field, Holes, Samples};
+use cuesta::height::{Field, Holes, Samples, synth};
 use cuesta::lod::Technique;
 use cuesta::measure::{geometric, watertight};
 use cuesta::view::{Lens, Metric, Tolerance, View};
@@ -100,16 +101,17 @@ impl Seen {
     }
 }
 
-fn check(script: u32, field: &Field, technique: &mut dyn Technique, views: &[View], seen: &Seen) {
+/// Proves every frame of a flight, and measures all of them or those of every so many where nothing waits.
+fn check(flight: &str, field: &Field, technique: &mut dyn Technique, views: &[View], measures: bool, seen: &Seen) {
     for (frame, view) in views.iter().enumerate() {
         let mut list = DrawList::default();
         technique.select(view, &mut list);
-        let proof = watertight::prove_list(field, view, technique.seams(), technique.resident(), &list);
-        proof.unwrap_or_else(|why| panic!("script {script}, frame {frame}: {why}"));
-        if list.waiting == 0 && script.is_multiple_of(4) {
+        let proof = watertight::prove_list(field, view, technique.manner().seams, technique.resident(), &list);
+        proof.unwrap_or_else(|why| panic!("{flight}, frame {frame}: {why}"));
+        if list.waiting == 0 && measures {
             let max_px = geometric::errors(field, view, technique.resident(), &list).screen_px.max;
             let px = view.tolerance.px;
-            assert!(max_px <= px * (1.0 + 1e-9), "script {script}, frame {frame}: {max_px} px of {px}");
+            assert!(max_px <= px * (1.0 + 1e-9), "{flight}, frame {frame}: {max_px} px of {px}");
         }
         seen.count(&list);
     }
@@ -131,7 +133,7 @@ fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
             let before = views[views.len().saturating_sub(2)];
             views.push(next(field, random, [&before, &views[views.len() - 1]]));
         }
-        check(script, field, &mut *technique, &views, &seen);
+        check(&format!("script {script}"), field, &mut *technique, &views, script.is_multiple_of(4), &seen);
     });
     let [frames, morphing, waiting, stitched] =
         [seen.frames, seen.morphing, seen.waiting, seen.stitched].map(AtomicU64::into_inner);
@@ -139,6 +141,28 @@ fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
         "{frames} frames, {morphing} in mid-morph, {stitched} of several levels, {waiting} with something waiting"
     );
     assert!(morphing > frames / 20 && waiting > frames / 20 && stitched > frames / 20, "all of it occurs");
+}
+
+#[test]
+fn every_frame_of_every_path_is_one_surface_within_the_tolerance() {
+    let fields = [(synth::Kind::Fractal, [97, 81]), (synth::Kind::Eroded, [97, 97]), (synth::Kind::Cliff, [81, 90])];
+    let fields = fields.map(|(kind, size)| Arc::new(synth::synth(kind, size, 3)));
+    let clocks = ["clock=speed", "clock=time", "clock=frames"];
+    let flights = fields.iter().flat_map(|field| paths::PATHS.iter().map(move |path| (field, path)));
+    let flights: Vec<_> = flights.flat_map(|(field, path)| clocks.map(|clock| (field, path, clock))).collect();
+    let ways = [("rebuild=100000", "tile=9", 24, false), ("rebuild=1", "tile=17", 90, true)];
+    for (rebuild, tile, frames, waits) in ways {
+        let seen = Seen::default();
+        flights.par_iter().for_each(|(field, path, clock)| {
+            let tolerance = Tolerance { px: 2.0, metric: Metric::Certified };
+            let views = path.views(field, frames, [320, 200], tolerance);
+            let mut technique = technique(field, "smooth-tiles", &[tile, clock, rebuild]);
+            check(&format!("{}, {clock}, {rebuild}", path.name), field, &mut *technique, &views, true, &seen);
+        });
+        let [frames, morphing, waiting] = [&seen.frames, &seen.morphing, &seen.waiting].map(|n| n.load(Relaxed));
+        println!("{rebuild}: {frames} frames, {morphing} in mid-morph, {waiting} with something waiting");
+        assert!(morphing > frames / 20 && (waiting > 0) == waits, "{rebuild}: {morphing}, {waiting} of {frames}");
+    }
 }
 
 /// Corners: lattice position, and height as bits.

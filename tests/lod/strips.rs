@@ -229,7 +229,7 @@ fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32)
         };
         let mut list = cuesta::draw::DrawList::default();
         strips.select(&view, &mut list);
-        watertight::prove_list(field, &view, strips.seams(), strips.resident(), &list).unwrap();
+        watertight::prove_list(field, &view, strips.manner().seams, strips.resident(), &list).unwrap();
         super::heights(field, &view, strips.resident(), &list)
     };
     (0..steps).map(step).collect()

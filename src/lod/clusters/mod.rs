@@ -44,7 +44,9 @@ use self::skirts::Skirts;
 use self::states::{MOST_SEEDS, Seeds};
 use self::tree::Tree;
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Instance, Limits, Morph, Seams, Source, Submission, Topology};
+use crate::draw::{
+    Draw, DrawList, Driver, Geometry, Instance, Limits, Manner, Morph, Seams, Source, Submission, Topology,
+};
 use crate::height::Field;
 use crate::height::bounds::Measure;
 use crate::view::View;
@@ -266,16 +268,13 @@ impl Technique for Clusters {
         self.measured
     }
 
-    fn morph(&self) -> Morph {
-        match self.morph {
+    fn manner(&self) -> Manner {
+        let morph = match self.morph {
             Morphing::Vertices => Morph::ByDistance,
             // Without morphing too: sides that meet a coarser block fall onto its edge.
             Morphing::Off | Morphing::Blocks => Morph::ByInstance,
-        }
-    }
-
-    fn seams(&self) -> Seams {
-        self.seams
+        };
+        Manner { morph, seams: self.seams, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

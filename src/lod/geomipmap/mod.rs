@@ -28,7 +28,7 @@ use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Morph, Source, Submission, Topology, weights};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Morph, Source, Submission, Topology, weights};
 use crate::height::Field;
 use crate::view::View;
 
@@ -258,8 +258,8 @@ impl Technique for GeoMipMap {
         self.distance == Distance::Error
     }
 
-    fn morph(&self) -> Morph {
-        if self.morph { Morph::ByInstance } else { Morph::No }
+    fn manner(&self) -> Manner {
+        Manner { morph: if self.morph { Morph::ByInstance } else { Morph::No }, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

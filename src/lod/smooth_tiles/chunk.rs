@@ -6,9 +6,11 @@
 //! middle of that level's edges, and with them the targets of the vertices inside whose edges end there. So one chunk
 //! serves whatever the neighbours do, and where their levels change only indices do.
 
+use glam::Vec3;
+
 use super::pattern;
-use crate::draw::ExplicitVertex;
 use crate::draw::weights::{self, Slot};
+use crate::draw::{ExplicitVertex, VertexNormals, normals};
 use crate::height::Field;
 
 /// The place of a tile among the samples.
@@ -42,45 +44,89 @@ fn side_slot(side: usize) -> Slot {
 /// The vertices of a tile at a level, row by row.
 pub fn build(field: &Field, place: Place, level: u32) -> Vec<ExplicitVertex> {
     let tile = Level { field, place, level, n: place.cells >> level };
-    (0..=tile.n).flat_map(|z| (0..=tile.n).map(move |x| [x, z])).map(|at| tile.vertex(at)).collect()
+    let vertex = |at: [i32; 2]| {
+        let [height, target, further] = tile.values(at, &|at| tile.height(at));
+        let (position, regions) = (at.map(|n| n << level), tile.regions(at));
+        ExplicitVertex { position, height, target, further, regions, ..ExplicitVertex::default() }
+    };
+    tile.vertices().map(vertex).collect()
+}
+
+/// Their normals, which go over as their heights do.
+pub fn build_normals(field: &Field, place: Place, level: u32) -> Vec<VertexNormals> {
+    let tile = Level { field, place, level, n: place.cells >> level };
+    let normals = |at: [i32; 2]| {
+        let [normal, target, further] = tile.values(at, &|at| tile.normal(at)).map(normals::pack);
+        VertexNormals { normal, target, further }
+    };
+    tile.vertices().map(normals).collect()
+}
+
+/// What a vertex takes along.
+trait Value: Copy {
+    /// That in the middle of an edge between two of it.
+    fn middle(self, other: Self) -> Self;
+}
+
+impl Value for f32 {
+    fn middle(self, other: f32) -> f32 {
+        (self + other) * 0.5
+    }
+}
+
+/// A unit normal.
+impl Value for Vec3 {
+    fn middle(self, other: Vec3) -> Vec3 {
+        (self + other).try_normalize().unwrap_or(Vec3::Y)
+    }
 }
 
 impl Level<'_> {
-    fn vertex(&self, at: [i32; 2]) -> ExplicitVertex {
-        let height = self.height(at);
-        let still = ExplicitVertex {
-            position: at.map(|n| n << self.level),
-            height,
-            target: height,
-            further: height,
-            ..ExplicitVertex::default()
-        };
-        let moves = |target, further, regions| ExplicitVertex { target, further, regions, ..still };
+    fn vertices(&self) -> impl Iterator<Item = [i32; 2]> {
+        let n = self.n;
+        (0..=n).flat_map(move |z| (0..=n).map(move |x| [x, z]))
+    }
+
+    /// What a vertex has, where it goes, and where its target goes itself, given what each vertex has.
+    fn values<V: Value>(&self, at: [i32; 2], value: &impl Fn([i32; 2]) -> V) -> [V; 3] {
+        let own = value(at);
         if let Some(side) = pattern::side(self.n, at) {
             let is_odd = at[1 - side % 2] & 1 == 1;
-            let target = if is_odd { self.middle(at, along(side, 1)) } else { self.side_target(at) };
-            return moves(target, target, weights::region(side_slot(side), u32::from(!is_odd)));
+            let target = if is_odd { middle(at, along(side, 1), value) } else { self.side_target(at, value) };
+            return [own, target, target];
+        }
+        if !self.moves_inside(at) {
+            return [own; 3];
         }
         let apart = self.half_edge(at);
-        if apart == [0, 0] || !self.is_inside(at) {
-            return still;
+        let [before, after] = ends(at, apart).map(|end| self.side_target(end, value));
+        [own, middle(at, apart, value), before.middle(after)]
+    }
+
+    /// Whose weights a vertex and its target go by.
+    fn regions(&self, at: [i32; 2]) -> u32 {
+        if let Some(side) = pattern::side(self.n, at) {
+            let is_odd = at[1 - side % 2] & 1 == 1;
+            return weights::region(side_slot(side), u32::from(!is_odd));
         }
-        let ends = [-1, 1].map(|sign| [0, 1].map(|k| at[k] + sign * apart[k]));
-        let side = ends.into_iter().find_map(|end| pattern::side(self.n, end));
-        let further = midpoint(self.side_target(ends[0]), self.side_target(ends[1]));
+        if !self.moves_inside(at) {
+            return 0;
+        }
+        let side = ends(at, self.half_edge(at)).into_iter().find_map(|end| pattern::side(self.n, end));
         let second = side.map_or(0, |side| weights::region(side_slot(side), 1));
-        moves(self.middle(at, apart), further, weights::region(weights::inside(0), 0) | second << 8)
+        weights::region(weights::inside(0), 0) | second << 8
     }
 
-    fn is_inside(&self, at: [i32; 2]) -> bool {
-        at.iter().all(|&n| n > 0 && n < self.n)
+    /// Whether a vertex lies inside and the next level lacks it.
+    fn moves_inside(&self, at: [i32; 2]) -> bool {
+        self.half_edge(at) != [0, 0] && at.iter().all(|&n| n > 0 && n < self.n)
     }
 
-    /// Where a vertex of the next level is when its side, if it lies on one, has gone on to the level after that.
-    fn side_target(&self, at: [i32; 2]) -> f32 {
+    /// What a vertex of the next level has when its side, if it lies on one, has gone on to the level after that.
+    fn side_target<V: Value>(&self, at: [i32; 2], value: &impl Fn([i32; 2]) -> V) -> V {
         match pattern::side(self.n, at) {
-            Some(side) if at[1 - side % 2] & 2 != 0 => self.middle(at, along(side, 2)),
-            _ => self.height(at),
+            Some(side) if at[1 - side % 2] & 2 != 0 => middle(at, along(side, 2), value),
+            _ => value(at),
         }
     }
 
@@ -97,17 +143,31 @@ impl Level<'_> {
         apart
     }
 
-    fn middle(&self, at: [i32; 2], apart: [i32; 2]) -> f32 {
-        let [before, after] = [-1, 1].map(|sign| self.height([0, 1].map(|k| at[k] + sign * apart[k])));
-        midpoint(before, after)
+    /// The sample of a vertex; what sticks out of the field collapses onto its edge.
+    fn sample(&self, at: [i32; 2]) -> [u32; 2] {
+        let size = self.field.size();
+        [0, 1].map(|k| ((self.place.origin[k] + (at[k] << self.level)) as u32).min(size[k] - 1))
     }
 
-    /// The sample of a vertex; what sticks out of the field collapses onto its edge.
     fn height(&self, at: [i32; 2]) -> f32 {
-        let size = self.field.size();
-        let [x, z] = [0, 1].map(|k| (self.place.origin[k] + (at[k] << self.level)).min(size[k] as i32 - 1));
-        self.field.height(x as u32, z as u32)
+        let [x, z] = self.sample(at);
+        self.field.height(x, z)
     }
+
+    fn normal(&self, at: [i32; 2]) -> Vec3 {
+        let [x, z] = self.sample(at);
+        self.field.normal(x, z)
+    }
+}
+
+/// The ends of an edge, from its middle and half of it.
+fn ends(middle: [i32; 2], half: [i32; 2]) -> [[i32; 2]; 2] {
+    [-1, 1].map(|sign| [0, 1].map(|k| middle[k] + sign * half[k]))
+}
+
+fn middle<V: Value>(at: [i32; 2], half: [i32; 2], value: &impl Fn([i32; 2]) -> V) -> V {
+    let [before, after] = ends(at, half).map(value);
+    before.middle(after)
 }
 
 /// A step along a side.
@@ -115,14 +175,11 @@ fn along(side: usize, step: i32) -> [i32; 2] {
     if side.is_multiple_of(2) { [0, step] } else { [step, 0] }
 }
 
-fn midpoint(a: f32, b: f32) -> f32 {
-    (a + b) * 0.5
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::draw::Instance;
+    use crate::draw::normals::explicit_normal;
     use crate::draw::place::explicit_height;
     use crate::draw::weights::ONE;
     use crate::height::{Holes, Samples};
@@ -182,6 +239,34 @@ mod tests {
             }
         }
         assert!(moved > 500, "{moved} vertices move");
+    }
+
+    #[test]
+    fn normals_begin_as_the_samples_and_end_between_those_of_the_coarser_level() {
+        let field = rough();
+        let mut moved = 0;
+        for (origin, level) in [[0, 0], [16, 32]].into_iter().flat_map(|o| (0..4).map(move |l| (o, l))) {
+            let place = Place { origin, cells: CELLS };
+            let (vertices, normals) = (build(&field, place, level), build_normals(&field, place, level));
+            assert_eq!(vertices.len(), normals.len());
+            let n = CELLS >> level;
+            let normal = |[x, z]: [i32; 2], step: i32| {
+                field.normal((origin[0] + x * step) as u32, (origin[1] + z * step) as u32)
+            };
+            let drawn = |at: [i32; 2], weight: u32| {
+                let instance = Instance { weights: weights::uniform(weight, [weight; 4]), ..Instance::default() };
+                let k = (at[1] * (n + 1) + at[0]) as usize;
+                explicit_normal(&instance, &vertices[k], &normals[k])
+            };
+            for at in (0..=n).flat_map(|z| (0..=n).map(move |x| [x, z])) {
+                assert!(drawn(at, 0).distance(normal(at, 1 << level)) < 2e-3, "the samples' own");
+                let [a, b] = ends(origin, level, at).map(|end| normal(end, 2 << level));
+                let end = drawn(at, ONE);
+                assert!(end.distance((a + b).try_normalize().unwrap()) < 4e-3, "level {level} of {origin:?} at {at:?}");
+                moved += u32::from(end.distance(drawn(at, 0)) > 0.01);
+            }
+        }
+        assert!(moved > 200, "{moved} normals turn");
     }
 
     #[test]

@@ -39,7 +39,10 @@ use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
 use super::{Entry, Setting, Settings, Technique, Values};
-use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology, Upload, weights};
+use crate::draw::{
+    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
+    VertexNormals, weights,
+};
 use crate::height::Field;
 use crate::view::View;
 
@@ -64,6 +67,12 @@ pub const ENTRY: Entry = Entry {
             values: Values::Words(&["on", "off"]),
             default: "on",
             about: "whether a level goes over into the next, or changes at once",
+        },
+        Setting {
+            key: "normals",
+            values: Values::Words(&["texture", "vertex"]),
+            default: "texture",
+            about: "what lights the land: the heights around each pixel, as elsewhere, or vertices' own normals that morph too",
         },
         Setting {
             key: "clock",
@@ -97,6 +106,18 @@ const REDUCTIONS: [&str; 6] = [
     "reduction at level 6",
 ];
 
+/// What a tile has on the device.
+struct Chunk {
+    vertices: Vec<ExplicitVertex>,
+    /// As many; none where nothing is lit by them.
+    normals: Vec<VertexNormals>,
+}
+
+/// What a vertex takes on the device.
+fn vertex_bytes(has_normals: bool) -> usize {
+    size_of::<ExplicitVertex>() + if has_normals { size_of::<VertexNormals>() } else { 0 }
+}
+
 struct SmoothTiles {
     field: Arc<Field>,
     tiles: Tiles,
@@ -106,6 +127,7 @@ struct SmoothTiles {
     clock: Clock,
     budget: Budget,
     morphs: bool,
+    has_normals: bool,
     /// Side of a tile, metres.
     side_m: f64,
     /// Level of each tile as it is drawn, in units of [`ONE`].
@@ -129,7 +151,8 @@ impl SmoothTiles {
         };
         let morphs = drive != Drive::AtOnce;
         let tiles = Tiles::new(&field, cells, morphs);
-        let vertex = size_of::<ExplicitVertex>();
+        let has_normals = settings.word("normals") == "vertex";
+        let vertex = vertex_bytes(has_normals);
         let queue = Queue::new(&tiles, (settings.number("memory") * 1048576.0) as usize / vertex);
         let chunks = settings.number("rebuild") as usize;
         let vertices = queue.vertices().min(UPLOAD_BYTES / vertex);
@@ -139,12 +162,14 @@ impl SmoothTiles {
         let mut room = Self {
             resident: Geometry {
                 vertices: vec![ExplicitVertex::default(); queue.vertices()],
+                normals: vec![VertexNormals::default(); if has_normals { queue.vertices() } else { 0 }],
                 indices: patterns.indices.clone(),
                 ..Geometry::default()
             },
             clock: Clock::new(drive, side_m),
             budget: Budget { chunks, vertices: vertices.min(chunks.saturating_mul(chunk::vertices(cells, 0))) },
             morphs,
+            has_normals,
             side_m,
             levels: vec![top * ONE; count],
             ceilings: [Vec::new(), Vec::new()],
@@ -162,14 +187,23 @@ impl SmoothTiles {
 
     fn build_coarsest(&mut self, top: u32) {
         for tile in 0..self.tiles.total() {
-            let vertices = chunk::build(&self.field, self.tiles.place(tile), top);
-            self.write(self.queue.first_vertices[tile], &vertices);
+            let chunk = self.chunk(tile, top);
+            self.write(self.queue.first_vertices[tile], &chunk);
         }
     }
 
-    fn write(&mut self, first_vertex: u32, vertices: &[ExplicitVertex]) {
+    fn chunk(&self, tile: usize, level: u32) -> Chunk {
+        let place = self.tiles.place(tile);
+        let normals = if self.has_normals { chunk::build_normals(&self.field, place, level) } else { Vec::new() };
+        Chunk { vertices: chunk::build(&self.field, place, level), normals }
+    }
+
+    fn write(&mut self, first_vertex: u32, Chunk { vertices, normals }: &Chunk) {
         let first = first_vertex as usize;
         self.resident.vertices[first..first + vertices.len()].copy_from_slice(vertices);
+        if self.has_normals {
+            self.resident.normals[first..first + normals.len()].copy_from_slice(normals);
+        }
     }
 
     /// How coarse each tile may be in a view.
@@ -211,11 +245,13 @@ impl SmoothTiles {
         let (tiles, is_visible) = (&self.tiles, &self.is_visible);
         let urgency = |tile: usize| (!is_visible[tile], tiles.bounds(tile).distance(view.eye));
         let moves = self.queue.advance(tiles, &self.aims, self.budget, urgency).to_vec();
-        let build = |moved: &queue::Move| chunk::build(&self.field, tiles.place(moved.tile), moved.level);
-        let chunks: Vec<_> = moves.par_iter().map(build).collect();
-        for (moved, vertices) in moves.iter().zip(chunks) {
-            self.write(moved.first_vertex, &vertices);
-            uploads.push(Upload::Vertices(moved.first_vertex, vertices));
+        let chunks: Vec<_> = moves.par_iter().map(|moved| self.chunk(moved.tile, moved.level)).collect();
+        for (moved, chunk) in moves.iter().zip(chunks) {
+            self.write(moved.first_vertex, &chunk);
+            uploads.push(Upload::Vertices(moved.first_vertex, chunk.vertices));
+            if self.has_normals {
+                uploads.push(Upload::Normals(moved.first_vertex, chunk.normals));
+            }
         }
     }
 
@@ -263,7 +299,7 @@ impl Technique for SmoothTiles {
 
     fn limits(&self) -> Limits {
         let count = self.tiles.total();
-        let upload_bytes = self.budget.vertices * size_of::<ExplicitVertex>();
+        let upload_bytes = self.budget.vertices * vertex_bytes(self.has_normals);
         Limits { draws: 2 * count, instances: count, upload_bytes, ..Limits::default() }
     }
 
@@ -295,8 +331,13 @@ impl Technique for SmoothTiles {
         true
     }
 
+    fn manner(&self) -> Manner {
+        let normals = if self.has_normals { Normals::Vertices } else { Normals::Texture };
+        Manner { normals, ..Manner::default() }
+    }
+
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
-        let bytes = |count: usize| (count * size_of::<ExplicitVertex>()) as f64;
+        let bytes = |count: usize| (count * vertex_bytes(self.has_normals)) as f64;
         let whole = [
             ("tiles", self.tiles.total() as f64, ""),
             ("chunks in use", self.queue.chunks() as f64, ""),

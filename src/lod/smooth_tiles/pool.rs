@@ -120,13 +120,14 @@ mod tests {
         let sizes = vec![81, 25, 9, 4];
         let mut pool = Pool::new(sizes.clone(), 20 * 324);
         let (mut held, mut seed, mut refused): (Vec<(u32, u32)>, u32, u32) = (Vec::new(), 1, 0);
-        for _ in 0..20_000 {
+        for step in 0..20_000 {
             seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
             let (choice, at) = (seed >> 24, (seed >> 8) as usize);
             // In turns it fills up and is emptied.
-            if choice.is_multiple_of(3) != (held.len() > 40 && at.is_multiple_of(2)) || held.is_empty() {
-                match pool.take(choice % 4, 0) {
-                    Some(first) => held.push((first, choice % 4)),
+            let fills = step / 500 % 2 == 0;
+            if choice.is_multiple_of(4) != fills || held.is_empty() {
+                match pool.take(at as u32 % 4, 0) {
+                    Some(first) => held.push((first, at as u32 % 4)),
                     None => refused += 1,
                 }
             } else {
@@ -139,6 +140,7 @@ mod tests {
             assert!(sorted.last().is_none_or(|&(first, k)| first as usize + sizes[k as usize] <= pool.vertices()));
         }
         assert_eq!(pool.held(), held.len());
+        assert!(refused > 300, "it was full {refused} times only");
         while pool.take(0, 0).is_some() {}
         assert!(pool.take(0, 0).is_none() && !pool.holds(&[1, 0, 0, 0], 0), "it is full");
         let mut pool = Pool::new(sizes, 20 * 324);
@@ -147,6 +149,5 @@ mod tests {
         assert!(pool.holds(&[12, 0, 0, 0], 0) && !pool.holds(&[13, 0, 0, 0], 0) && pool.holds(&[4, 1, 0, 0], 1));
         all.into_iter().for_each(|first| pool.give(first));
         assert_eq!(pool.used_vertices(), 0);
-        println!("{refused} refused");
     }
 }

@@ -1,0 +1,56 @@
+//! Normals that explicit vertices carry, and how they go over with their heights: the CPU twin of
+//! `shaders/position.glsl`.
+
+use glam::{Vec2, Vec3};
+
+use super::layout::{ExplicitVertex, Instance, VertexNormals};
+use super::place::explicit_weights;
+
+/// Where the normals come from by which a technique's triangles are lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Normals {
+    /// From the height texture, for each pixel.
+    #[default]
+    Texture,
+    /// From the vertices ([`Geometry::normals`](super::Geometry::normals)), between which they are interpolated.
+    Vertices,
+}
+
+/// A unit vector that does not point down, in 32 bits: x below z, each a signed normalised 16-bit number.
+pub fn pack(normal: Vec3) -> u32 {
+    let snorm = |n: f32| u32::from((n.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
+    snorm(normal.x) | snorm(normal.z) << 16
+}
+
+/// What [`pack`] packed, to 1/32767 in x and z.
+pub fn unpack(packed: u32) -> Vec3 {
+    let plan = [packed, packed >> 16].map(|n| (f32::from(n as u16 as i16) / 32767.0).max(-1.0));
+    let plan = Vec2::from(plan);
+    Vec3::new(plan.x, (1.0 - plan.length_squared()).max(0.0).sqrt(), plan.y)
+}
+
+/// The unit normal of a vertex, gone over as far as its height has.
+pub fn explicit_normal(instance: &Instance, vertex: &ExplicitVertex, normals: &VertexNormals) -> Vec3 {
+    let [weight, further] = explicit_weights(instance, vertex);
+    let target = unpack(normals.target).lerp(unpack(normals.further), further);
+    // None points down: their mean is not zero, unless two are level and opposite.
+    unpack(normals.normal).lerp(target, weight).try_normalize().unwrap_or(Vec3::Y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packing_keeps_a_direction() {
+        let mut worst = 0f32;
+        for k in 0..40_000u32 {
+            let (turn, lean) = (k as f32 * 0.618, (k as f32 / 40_000.0).powi(2) * 1.57);
+            let normal = Vec3::new(lean.sin() * turn.cos(), lean.cos(), lean.sin() * turn.sin());
+            worst = worst.max(unpack(pack(normal)).angle_between(normal));
+        }
+        // Where a normal is almost level its y follows from small differences.
+        assert!(worst < 0.006, "{worst} radians");
+        assert_eq!(unpack(pack(Vec3::Y)), Vec3::Y);
+    }
+}
