@@ -74,9 +74,15 @@ impl Planned {
     /// Reads and makes the fields and lists the cases.
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
         let asked = techniques(args)?;
-        ensure!(args.tolerance.iter().all(|px| px.is_finite() && *px > 0.0), "--tolerance: expected positive pixels");
-        for (flag, costs) in [("--triangles", &args.triangles), ("--frame-time", &args.frame_time)] {
-            ensure!(costs.iter().all(|cost| cost.is_finite() && *cost > 0.0), "{flag}: expected positive numbers");
+        let numbers = [
+            ("--tolerance", "pixels", &args.tolerance),
+            ("--triangles", "triangles", &args.triangles),
+            ("--frame-time", "milliseconds", &args.frame_time),
+        ];
+        for (flag, unit, values) in numbers {
+            if let Some(wrong) = values.iter().find(|value| !(value.is_finite() && **value > 0.0)) {
+                bail!("{flag} {wrong}: expected more than 0 {unit}");
+            }
         }
         let (mut fields, mut flights) = (Vec::new(), Vec::new());
         if args.kit {

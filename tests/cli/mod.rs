@@ -260,6 +260,38 @@ mod with_a_device {
     }
 
     #[test]
+    fn a_benchmark_holds_what_it_is_asked_for() {
+        let folder = folder();
+        for wrong in ["0", "inf", "many"] {
+            refused(folder.path(), &["bench", "demo", "--out", "b", "--triangles", wrong], &["--triangles", wrong]);
+            refused(folder.path(), &["bench", "demo", "--out", "b", "--frame-time", wrong], &["--frame-time", wrong]);
+        }
+        if !has_device() {
+            return;
+        }
+        synth(folder.path(), "eroded", "257x257", "land.tif");
+        // A whole circle in so few frames: what is in sight changes faster than one step can follow.
+        let case = ["--technique", "sorted-strips", "--path", "circle", "--frames", "40", "--size", "160x90"];
+        let goals = ["--triangles", "3000,10000", "--frame-time", "4", "--rounds", "1", "--out", "b"];
+        let output = cuesta(folder.path(), &[&["bench", "land.tif"][..], &case, &goals].concat());
+        assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(folder.path().join("b/results.json")).unwrap();
+        let results: Value = serde_json::from_str(&text).unwrap();
+        let cases = results["cases"].as_array().unwrap();
+        assert_eq!(cases.len(), 3);
+        for (case, target) in cases.iter().zip([3000.0, 10000.0]) {
+            assert_eq!(case["case"]["goal"]["triangles"].as_f64(), Some(target), "{case}");
+            let mean = case["time"]["triangles"].as_f64().unwrap() / target;
+            assert!((0.9..1.1).contains(&mean), "{target}: {mean} of it on average");
+            assert!(case["time"]["held"]["within"].as_f64().unwrap() > 0.1, "{case}");
+        }
+        // Milliseconds are the machine's own: what counts is that the tolerance moved.
+        let tolerance = &cases[2]["time"]["held"]["tolerance_px"];
+        assert_eq!(cases[2]["case"]["goal"]["frame_ms"].as_f64(), Some(4.0));
+        assert!(tolerance["max"].as_f64() > tolerance["mean"].as_f64(), "{tolerance}");
+    }
+
+    #[test]
     fn skirt_pixels_are_counted() {
         if !has_device() {
             return;

@@ -42,7 +42,12 @@ fn targets_are_held_along_a_circle() {
     let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
     let mut views = paths::find("circle").expect("a named path").views(&field, 1000, [1280, 720], tolerance);
     views.truncate(FLOWN);
-    let rooms: [(&str, &[&str]); 3] = [("sorted-strips", &[]), ("clusters", &["block=8"]), ("geomipmap", &["block=9"])];
+    let rooms: [(&str, &[&str]); 4] = [
+        ("sorted-strips", &[]),
+        ("clusters", &["block=8"]),
+        ("geomipmap", &["block=9"]),
+        ("smooth-tiles", &["tile=9"]),
+    ];
     let cases: Vec<_> = rooms.iter().flat_map(|room| TARGETS.map(|target| (*room, target))).collect();
     let report = |&((name, settings), target): &((&str, &[&str]), f64)| {
         let costs = flown(&field, name, settings, target, &views);
