@@ -132,6 +132,26 @@ mod tests {
         Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
     }
 
+    /// Half way between a vertex of the side that goes up and one inside that goes down, and the inside goes first: a
+    /// sample that level 1 is off by as much as level 2 is off by half as much again on the way.
+    #[test]
+    fn a_way_may_be_further_off_than_both_its_ends() {
+        let size = CELLS as u32 + 1;
+        let height = |k: u32| match (k % size, k / size) {
+            (0, 2) => -1.0,
+            (1 | 2, 2) => 1.0,
+            _ => 0.0,
+        };
+        let heights = (0..size * size).map(height).collect();
+        let field = Field::new(Samples::F32(heights), [size; 2], [1.0; 2], Holes::none((size * size) as usize));
+        let tile = Tile::new(&field, Place { origin: [0, 0], cells: CELLS });
+        let ends = [1, 2].map(|level| tile.level_error(&chunk::build(&field, tile.place, level), level));
+        assert!(ends.iter().all(|end| (end - 1.0).abs() < 1e-6), "{ends:?}");
+        assert!((tile.way_error(&chunk::build(&field, tile.place, 1), 1) - 1.5).abs() < 1e-6);
+        let [morphing, still] = [true, false].map(|morphs| tile.errors(morphs)[2]);
+        assert!(morphing >= 1.5 && still < 1.01, "{morphing} m, still {still} m");
+    }
+
     /// The bound of the way from one level to the next, at any weights inside and on the sides, and how often it is
     /// needed beyond what levels are off when they are still.
     #[test]
