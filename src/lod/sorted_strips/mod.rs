@@ -27,6 +27,7 @@
 
 pub mod certified;
 pub mod footprint;
+pub mod join;
 pub mod measure;
 pub mod pages;
 pub mod shapes;
@@ -42,6 +43,7 @@ use rayon::prelude::*;
 
 use self::certified::{Certified, bounds};
 use self::footprint::Footprint;
+use self::join::{join, starts};
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
 use self::shapes::Shapes;
@@ -216,11 +218,12 @@ impl SortedStrips {
             std::mem::swap(&mut streamed.vertices, vertices);
             std::mem::swap(&mut streamed.indices, indices);
         } else {
-            for Stream { vertices, indices } in workers[..ends.len()].iter().map(|worker| &worker.stream) {
-                let base = streamed.vertices.len() as u32;
-                streamed.vertices.extend_from_slice(vertices);
-                streamed.indices.extend(indices.iter().map(|k| base + k));
-            }
+            let streams: Vec<&Stream> = workers[..ends.len()].iter().map(|worker| &worker.stream).collect();
+            let vertices: Vec<_> = streams.iter().map(|stream| stream.vertices.as_slice()).collect();
+            let indices: Vec<_> = streams.iter().map(|stream| stream.indices.as_slice()).collect();
+            let bases = starts(vertices.iter().map(|of_row| of_row.len()));
+            join(&vertices, &mut streamed.vertices, |_, vertex| vertex);
+            join(&indices, &mut streamed.indices, |row, index| bases[row] as u32 + index);
         }
         let mut first = 0;
         for (batch, &end) in (0u32..).zip(ends) {
