@@ -287,6 +287,7 @@ impl Technique for SortedStrips {
         let pages = self.pages.grid.count.map(f64::from);
         vec![
             ("pages", pages[0] * pages[1], ""),
+            ("pages in sight", self.pages.list().len() as f64, ""),
             ("cells along a side of a page", f64::from(self.pages.grid.side()), ""),
             ("bytes of errors", self.errors.bytes() as f64, "B"),
         ]
