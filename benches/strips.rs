@@ -16,6 +16,9 @@ use cuesta::view::{Metric, Tolerance, View};
 const FRAMES: usize = 50;
 const REPEATS: usize = 5;
 
+/// Lengths of triangles' sides: from a page in one quad to the field's own samples far away.
+const EDGES_PX: [f64; 12] = [400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
+
 /// A series: mean triangles and mean of the frames' shortest times, seconds; the time of all frames' lookups included.
 fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[View]) -> [f64; 2] {
     let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
@@ -66,7 +69,7 @@ fn main() {
             let settings = [("level", "uniform".to_string()), ("edge", edge.to_string())];
             series(&field, name, &settings, &views)
         };
-        let points = [400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5].map(of_edge);
+        let points = EDGES_PX.map(of_edge);
         report(&format!("{name}, uniform"), &points);
     }
     let at = |px: f64| {

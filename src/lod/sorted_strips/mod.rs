@@ -51,7 +51,7 @@ use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
+use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
 use crate::view::{Containment, View};
 
@@ -218,11 +218,7 @@ impl SortedStrips {
             std::mem::swap(&mut streamed.vertices, vertices);
             std::mem::swap(&mut streamed.indices, indices);
         } else {
-            for Stream { vertices, indices } in workers[..ends.len()].iter().map(|worker| &worker.stream) {
-                let base = streamed.vertices.len() as u32;
-                streamed.vertices.extend_from_slice(vertices);
-                streamed.indices.extend(indices.iter().map(|k| base + k));
-            }
+            gather(&workers[..ends.len()], streamed);
         }
         let mut first = 0;
         for (batch, &end) in (0u32..).zip(ends) {
@@ -237,6 +233,27 @@ impl SortedStrips {
             turn_round(list);
         }
     }
+}
+
+/// Rows one after the other, each copied to where the lengths of those before it say, in parallel.
+fn gather(rows: &[Worker], all: &mut Geometry) {
+    let total = |length: fn(&Stream) -> usize| rows.iter().map(|row| length(&row.stream)).sum();
+    rayon::join(
+        || all.vertices.resize(total(|stream| stream.vertices.len()), ExplicitVertex::default()),
+        || all.indices.resize(total(|stream| stream.indices.len()), 0),
+    );
+    let (mut vertices, mut indices, mut base) = (&mut all.vertices[..], &mut all.indices[..], 0);
+    rayon::scope(|scope| {
+        for Stream { vertices: from, indices: of } in rows.iter().map(|row| &row.stream) {
+            let (to, after) = std::mem::take(&mut vertices).split_at_mut(from.len());
+            vertices = after;
+            scope.spawn(move |_| to.copy_from_slice(from));
+            let (to, after) = std::mem::take(&mut indices).split_at_mut(of.len());
+            indices = after;
+            scope.spawn(move |_| to.iter_mut().zip(of).for_each(|(to, k)| *to = base + k));
+            base += from.len() as u32;
+        }
+    });
 }
 
 /// Turns the order of all triangles round.
@@ -286,6 +303,7 @@ impl Technique for SortedStrips {
         let pages = self.pages.grid.count.map(f64::from);
         vec![
             ("pages", pages[0] * pages[1], ""),
+            ("pages in sight", self.pages.list().len() as f64, ""),
             ("cells along a side of a page", f64::from(self.pages.grid.side()), ""),
             ("bytes of errors", self.errors.bytes() as f64, "B"),
         ]
