@@ -17,7 +17,7 @@ const FRAMES: usize = 50;
 const REPEATS: usize = 5;
 
 /// Lengths of a triangle's side, pixels: from a few hundred triangles to a million.
-const EDGES: [f64; 14] = [6400.0, 1600.0, 400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 2.0];
+const EDGES: [f64; 14] = [6400.0, 1600.0, 400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
 
 /// Means over the frames of a series.
 #[derive(Clone, Copy)]

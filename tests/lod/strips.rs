@@ -65,20 +65,19 @@ impl Scene {
             splits.close(&pages);
         }
         let eye = size.map(|n| f64::from(n) * (2.0 * dice.share() - 0.5));
-        let gaze = Gaze { major: dice.below(2) as usize, eye, ahead: [dice.sign(), dice.sign()] };
+        let [ahead, against] = [[dice.sign(), dice.sign()], [dice.sign(), dice.sign()]];
+        let gaze = Gaze { major: dice.below(2) as usize, eye, ahead, against: against.map(|sign| sign < 0) };
         Self { field, pages, splits, gaze }
     }
 
     fn triangles(&self) -> Vec<Drawn> {
         let shapes = Shapes::default();
-        let (major, eye) = (self.gaze.major, self.gaze.eye);
         let ground = Ground {
             field: &self.field,
             pages: &self.pages,
             levels: &self.splits,
             shapes: &shapes,
-            major,
-            eye,
+            gaze: self.gaze,
             blends: false,
         };
         let streams = self.pages.rows(&self.gaze).into_iter().map(|row| ground.walk(&row));
@@ -160,8 +159,8 @@ fn is_any_split(scene: &Scene, level: u32) -> bool {
     (0..count[1]).any(|z| (0..count[0]).any(|x| scene.splits.is_split(level, [x, z])))
 }
 
-/// In plan: rays from the eye, in the view's direction where they begin in its own row or column of pages, meet
-/// triangles in the order in which they come. From another eye they do not.
+/// In plan: rays from the eye, of all directions that its view is said to have, meet triangles in the order in which
+/// they come. From another eye they do not.
 #[test]
 fn rays_meet_triangles_in_order() {
     let rays = |seed: u64| {
@@ -183,7 +182,8 @@ fn follow(seed: u64, triangles: &[Drawn], gaze: &Gaze) -> [usize; 2] {
     let mut dice = Dice(seed);
     let mut sums = [0; 2];
     for _ in 0..20 {
-        let towards = [0, 1].map(|k| f64::from(gaze.ahead[k]) * dice.share());
+        let least = gaze.against.map(|against| if against { -1.0 } else { 0.0 });
+        let towards = [0, 1].map(|k| f64::from(gaze.ahead[k]) * (least[k] + (1.0 - least[k]) * dice.share()));
         let in_ray = |(k, t): (usize, &Drawn)| Some((middle_inside(t, gaze.eye, towards)?, k));
         let mut met: Vec<(f64, usize)> = triangles.iter().enumerate().filter_map(in_ray).collect();
         met.sort_by(|a, b| a.0.total_cmp(&b.0));

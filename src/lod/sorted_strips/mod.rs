@@ -14,7 +14,8 @@
 //! - shapes are combined where finer quads are on several sides of one: the published five are not enough there;
 //! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
 //!   one direction. `order=back` turns the list round: both orders are the same triangles;
-//! - a quad's triangles are ordered too, by the eye's side of the lines between them;
+//! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
+//!   row and column of pages, where some rays go against the walk ([`order`]);
 //! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
 //!   paper's variant in three dimensions needs, and a bound would be spent on it;
 //! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
@@ -29,6 +30,7 @@ pub mod certified;
 pub mod footprint;
 pub mod join;
 pub mod measure;
+pub mod order;
 pub mod pages;
 pub mod shapes;
 pub mod splits;
@@ -169,7 +171,7 @@ impl SortedStrips {
     /// last index by row. `None` if they would not fit the limits.
     fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<usize>> {
         let (field, pages, shapes, limits) = (&*self.field, &self.pages, &self.shapes, self.limits);
-        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: self.blends };
+        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: self.blends };
         let has_room = |vertices: usize, indices: usize| vertices <= limits.vertices && indices <= limits.indices;
         if self.is_serial {
             let worker = &mut workers[0];

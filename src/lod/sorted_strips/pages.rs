@@ -3,10 +3,11 @@
 //! Rows of pages along the minor direction are walked outward from the eye's own row, and in each row pages outward
 //! from the eye's own column. So every ray that leaves the eye meets pages in the order in which they are drawn, and
 //! every page is walked away from the eye. Only in the eye's own row and column, which have land on both sides of
-//! the eye, is the direction that of the view.
+//! the eye, is the direction that of the view; where some rays go against it, see [`order`](super::order).
 
 use std::ops::Range;
 
+use super::order::Crossing;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
@@ -178,6 +179,8 @@ pub struct Gaze {
     pub eye: [f64; 2],
     /// Signs of the view's direction, ±1.
     pub ahead: [i32; 2],
+    /// Whether any ray goes the other way.
+    pub against: [bool; 2],
 }
 
 /// Where parallel rays are said to come from, in the field's sizes.
@@ -196,12 +199,25 @@ impl Gaze {
             let from = [view.eye.x, view.eye.z][k] - far_m * forward[k];
             (from - field.origin[k]) / field.spacing[k]
         });
-        Self {
-            major: usize::from(forward[0].abs() <= forward[1].abs()),
-            eye,
-            ahead: forward.map(|f| if f < 0.0 { -1 } else { 1 }),
-        }
+        let ahead = forward.map(|f| if f < 0.0 { -1 } else { 1 });
+        Self { major: usize::from(forward[0].abs() <= forward[1].abs()), eye, ahead, against: against(view, ahead) }
     }
+
+    /// What the walk of a run is not away from, by its first corner and its directions along (minor, major).
+    pub fn crossing(&self, origin: [i32; 2], signs: [i32; 2]) -> Crossing {
+        let axes = [1 - self.major, self.major];
+        let eye = [0, 1].map(|k| f64::from(signs[k]) * (self.eye[axes[k]] - f64::from(origin[k])));
+        Crossing { eye, against: [0, 1].map(|k| eye[k] > 0.0 && self.against[axes[k]]) }
+    }
+}
+
+/// Whether any ray of a view goes against a direction: rays lie between those of the picture's corners.
+fn against(view: &View, ahead: [i32; 2]) -> [bool; 2] {
+    let Lens::Perspective { .. } = view.lens else { return [false; 2] };
+    let half = view.size.map(|n| 0.5 * f64::from(n) / view.focal_px());
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+        .map(|(x, y)| view.forward() + view.world_from_eye * glam::DVec3::new(x * half[0], y * half[1], 0.0));
+    [0, 1].map(|k| corners.iter().any(|ray| [ray.x, ray.z][k] * f64::from(ahead[k]) < 0.0))
 }
 
 #[cfg(test)]
@@ -228,7 +244,7 @@ mod tests {
         let grid = Grid { level: 4, count: [9, 2], last: [140, 31] };
         let mut pages = Pages::none(grid);
         pages.set([0, 1, 3, 4, 5, 6, 8].map(|x| [x, 1]));
-        let gaze = Gaze { major: 1, eye: [70.0, -100.0], ahead: [1, 1] };
+        let gaze = Gaze { major: 1, eye: [70.0, -100.0], ahead: [1, 1], against: [false; 2] };
         let rows = pages.rows(&gaze);
         let run = |first, pages, sign| Run { first, pages, sign };
         assert_eq!(rows.len(), 1);

@@ -25,7 +25,8 @@
 //! Rows of pages are walked independently: the front edge of the row behind follows from the level function, and its
 //! vertices are made again, as the paper copies them from page to page.
 
-use super::pages::{Pages, Row, Run, placed};
+use super::order::{Crossing, Order};
+use super::pages::{Gaze, Pages, Row, Run, placed};
 use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
 use super::splits::Levels;
 use crate::draw::ExplicitVertex;
@@ -56,6 +57,7 @@ pub struct Worker {
     pub stream: Stream,
     marks: Vec<Mark>,
     start: Vec<u32>,
+    order: Order,
 }
 
 /// What every row of a frame is walked with.
@@ -68,10 +70,8 @@ pub struct Ground<'a, L> {
     pub levels: &'a L,
     /// All kinds of quads.
     pub shapes: &'a Shapes,
-    /// The axis along which strips follow each other.
-    pub major: usize,
-    /// Where rays come from, samples.
-    pub eye: [f64; 2],
+    /// Where the eye is and looks.
+    pub gaze: Gaze,
     /// Whether vertices go over into the next level.
     pub blends: bool,
 }
@@ -127,8 +127,9 @@ struct Walk<'a, L> {
     origin: [i32; 2],
     /// Steps along the minor and the major direction, ±1.
     signs: [i32; 2],
-    /// Where rays come from, counted from the first corner.
-    eye: [f64; 2],
+    /// Where rays come from, counted from the first corner, and which of them the walk is not away from.
+    crossing: Crossing,
+    order: Order,
     /// Length of the run.
     length: i32,
     /// By column.
@@ -154,7 +155,7 @@ impl<L: Levels> Ground<'_, L> {
 
     /// Walks a row of pages and appends it to the worker's stream.
     pub fn walk_on(&self, row: &Row, worker: &mut Worker) {
-        let (side, minor) = (self.pages.grid.side(), 1 - self.major);
+        let side = self.pages.grid.side();
         let behind = |sign: i32, n: i32| (if sign > 0 { n } else { n + 1 }) * side;
         let longest = row.runs.iter().map(|run| run.pages * side).max().unwrap_or(0);
         let mut walk = Walk {
@@ -162,7 +163,8 @@ impl<L: Levels> Ground<'_, L> {
             stream: std::mem::take(&mut worker.stream),
             origin: [0, behind(row.sign, row.row)],
             signs: [0, row.sign],
-            eye: [0.0; 2],
+            crossing: Crossing::default(),
+            order: std::mem::take(&mut worker.order),
             length: 0,
             marks: std::mem::take(&mut worker.marks),
             start: std::mem::take(&mut worker.start),
@@ -179,10 +181,7 @@ impl<L: Levels> Ground<'_, L> {
             walk.origin[0] = behind(run.sign, run.first);
             walk.signs[0] = run.sign;
             walk.length = run.pages * side;
-            walk.eye = [0, 1].map(|k| {
-                let along = self.eye[if k == 0 { minor } else { self.major }];
-                f64::from(walk.signs[k]) * (along - f64::from(walk.origin[k]))
-            });
+            walk.crossing = self.gaze.crossing(walk.origin, walk.signs);
             // Two runs away from the same side share its vertices.
             if last_start != Some(walk.origin[0]) {
                 walk.start.fill(UNMADE);
@@ -190,7 +189,7 @@ impl<L: Levels> Ground<'_, L> {
             last_start = Some(walk.origin[0]);
             walk.run(row, run);
         }
-        *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start };
+        *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start, order: walk.order };
     }
 }
 
@@ -232,7 +231,7 @@ fn half_edge(position: [i32; 2], level: u32) -> [i32; 2] {
 
 impl<L: Levels> Walk<'_, L> {
     fn run(&mut self, row: &Row, run: &Run) {
-        let Ground { pages, major, .. } = *self.ground;
+        let Ground { pages, gaze: Gaze { major, .. }, .. } = *self.ground;
         let level = pages.grid.level;
         let page = |row: i32, column: i32| placed(major, row, column);
         // Positions grow with (u, v) or with (v, u).
@@ -251,6 +250,7 @@ impl<L: Levels> Walk<'_, L> {
         self.has_behind = row.has_behind;
         let side = Side { back: self.start_vertex(0), middle: None, front: self.start_vertex(pages.grid.side()) };
         self.strip(Square { level, column: 0, row: 0 }, side);
+        self.order.finish(&mut self.stream.indices);
     }
 
     /// Marks the vertices of the front edges behind the row.
@@ -317,7 +317,7 @@ impl<L: Levels> Walk<'_, L> {
     #[inline]
     fn has_land_behind(&self, u: i32, v: i32) -> bool {
         let Pages { grid, .. } = self.ground.pages;
-        let is_beyond = self.origin[1] + self.signs[1] * v >= grid.last[self.ground.major] && self.signs[1] < 0;
+        let is_beyond = self.origin[1] + self.signs[1] * v >= grid.last[self.ground.gaze.major] && self.signs[1] < 0;
         if v > 0 || is_beyond {
             return !is_beyond;
         }
@@ -346,7 +346,7 @@ impl<L: Levels> Walk<'_, L> {
         let mask = middles.iter().map(|(middle, bit)| if middle.is_some() { *bit } else { 0 }).sum();
         let [e, f, g] = middles.map(|(middle, _)| middle.unwrap_or(UNMADE));
         let shape = self.ground.shapes.single(mask, self.is_rising(square));
-        self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, UNMADE], [u, v], size);
+        self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, UNMADE], square, false);
         Side { back, middle, front }
     }
 
@@ -361,15 +361,22 @@ impl<L: Levels> Walk<'_, L> {
         let mut slots = [UNMADE; 8];
         slots[..4].copy_from_slice(&[trailing.back, back, front, trailing.front]);
         slots[slot::M] = middle;
-        self.push(self.ground.shapes.pair(), slots, [u, v], size);
+        self.push(self.ground.shapes.pair(), slots, square, true);
         Side { back, middle: None, front }
     }
 
     /// The triangles of a quad, nearest first.
     #[inline]
-    fn push(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32) {
-        let to_halves = 2.0 / f64::from(size);
-        let eye = [(self.eye[0] - f64::from(u)) * to_halves, (self.eye[1] - f64::from(v)) * to_halves];
+    fn push(&mut self, shape: &Shape, slots: [u32; 8], square: Square, is_pair: bool) {
+        let Square { level, column, row } = square;
+        let (size, [u, v]) = (1 << level, [column << level, row << level]);
+        let (to_halves, [x, z]) = (2.0 / f64::from(size), self.crossing.eye);
+        let eye = [(x - f64::from(u)) * to_halves, (z - f64::from(v)) * to_halves];
+        if self.crossing.is_any() {
+            let page = self.ground.pages.grid.level;
+            let first = self.stream.indices.len();
+            self.order.begin(&self.crossing, page, (level, [column, row]), is_pair, first);
+        }
         if self.sticks_out {
             return self.push_collapsed(shape, slots, [u, v], size, eye);
         }
@@ -382,7 +389,7 @@ impl<L: Levels> Walk<'_, L> {
     /// The same where vertices may lie elsewhere than in their shape: triangles without area are left out.
     #[cold]
     fn push_collapsed(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
-        let (major, last) = (self.ground.major, self.ground.pages.grid.last);
+        let (major, last) = (self.ground.gaze.major, self.ground.pages.grid.last);
         let collapsed = |k: usize, first: i32, halves: f64| {
             let along = f64::from(first) + halves * f64::from(size) / 2.0;
             let position = f64::from(self.origin[k]) + f64::from(self.signs[k]) * along;
@@ -419,7 +426,7 @@ impl<L: Levels> Walk<'_, L> {
             let first = self.origin[k] >> square.level;
             if self.signs[k] > 0 { first + n } else { first - 1 - n }
         };
-        placed(self.ground.major, place(1, square.row), place(0, square.column))
+        placed(self.ground.gaze.major, place(1, square.row), place(0, square.column))
     }
 
     /// The vertex behind, if it is used.
@@ -454,7 +461,7 @@ impl<L: Levels> Walk<'_, L> {
     #[inline]
     fn vertex(&mut self, u: i32, v: i32) -> u32 {
         let [u, v] = [self.origin[0] + self.signs[0] * u, self.origin[1] + self.signs[1] * v];
-        let (at, last) = (placed(self.ground.major, v, u), self.ground.pages.grid.last);
+        let (at, last) = (placed(self.ground.gaze.major, v, u), self.ground.pages.grid.last);
         let position = [at[0].min(last[0]), at[1].min(last[1])];
         self.stream.vertices.push(self.ground.vertex(position));
         self.stream.vertices.len() as u32 - 1
