@@ -16,20 +16,15 @@ use cuesta::view::{Metric, Tolerance, View};
 const FRAMES: usize = 50;
 const REPEATS: usize = 5;
 
-/// Lengths of a triangle's side, pixels: from a few hundred triangles to a million.
-const EDGES: [f64; 14] = [6400.0, 1600.0, 400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
+/// Lengths of triangles' sides: from a page in one quad to the field's own samples far away.
+const EDGES_PX: [f64; 12] = [400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
 
-/// Means over the frames of a series.
-#[derive(Clone, Copy)]
-struct Point {
-    triangles: f64,
-    /// The shortest time of each frame, everything from the view to the list included, seconds.
-    seconds: f64,
-    /// Pages in sight.
-    pages: f64,
-}
+/// The same on land so small that the pages in sight are about as many as theirs, 35.
+const FEW_EDGES_PX: [f64; 3] = [400.0, 100.0, 40.0];
 
-fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[View]) -> Point {
+/// A series: mean triangles, mean of the frames' shortest times, seconds, and mean pages in sight; the time of all
+/// frames' lookups included.
+fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[View]) -> [f64; 3] {
     let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
     let entry = lod::find(name).expect("in the table");
     let settings: Vec<_> = settings.iter().map(|(key, value)| (key.to_string(), value.clone())).collect();
@@ -45,10 +40,10 @@ fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[
         });
         sum[1] += times.fold(f64::INFINITY, f64::min);
         sum[0] += list.triangles() as f64;
-        sum[2] += strips.figures().iter().find(|figure| figure.0 == "pages in sight").map_or(0.0, |figure| figure.1);
+        let pages = strips.figures().into_iter().find(|figure| figure.0 == "pages in sight");
+        sum[2] += pages.map_or(0.0, |figure| figure.1);
     }
-    let [triangles, seconds, pages] = sum.map(|sum| sum / views.len() as f64);
-    Point { triangles, seconds, pages }
+    sum.map(|sum| sum / views.len() as f64)
 }
 
 /// Slope, intercept and R² of the least squares line through points.
@@ -60,57 +55,61 @@ fn line(points: &[[f64; 2]]) -> [f64; 3] {
     [xy / xx, y - xy / xx * x, xy * xy / (xx * yy)]
 }
 
-fn report(title: &str, points: &[Point]) {
+/// Prints a series and returns what a triangle costs, seconds.
+fn report(title: &str, points: &[[f64; 2]]) -> f64 {
     println!("{title}");
-    for Point { triangles, seconds, pages } in points {
-        let speed = 1e-6 * triangles / seconds;
-        println!("  {triangles:10.0} triangles {pages:5.0} pages {:9.3} ms {speed:6.1} M/s", 1e3 * seconds);
+    for [triangles, seconds] in points {
+        println!("  {triangles:10.0} triangles {:9.3} ms {:6.1} M/s", 1e3 * seconds, 1e-6 * triangles / seconds);
     }
-    let points: Vec<_> = points.iter().map(|point| [point.triangles, point.seconds]).collect();
-    let [slope, intercept, r2] = line(&points);
+    let [slope, intercept, r2] = line(points);
     println!("  {:.1} M/s + {:.3} ms a frame, R² {r2:.5}", 1e-6 / slope, 1e3 * intercept);
+    slope
 }
 
-/// The same triangles from more and more pages: what a page costs.
-fn cost_of_a_page(field: &Arc<Field>, views: &[View]) {
-    let of_page = |page: u32| {
-        let settings = [("level", "uniform"), ("edge", "15"), ("page", &page.to_string())];
-        let settings = settings.map(|(key, value)| (key, value.to_string()));
-        series(field, "sorted-strips:serial", &settings, views)
-    };
-    let [small, middle, large] = [16, 64, 256].map(of_page);
-    for (few, many) in [(large, middle), (middle, small)] {
-        let (pages, seconds) = (many.pages - few.pages, many.seconds - few.seconds);
-        let triangles = many.triangles - few.triangles;
-        println!("  {pages:.0} pages and {triangles:.0} triangles more: {:.3} µs a page", 1e6 * seconds / pages);
-    }
+/// The circle over land that is tiled `tiles` times along both axes.
+fn scene(tiles: u32) -> (Arc<Field>, Vec<View>) {
+    let mut field = synth::synth(synth::Kind::Eroded, [512, 512], 7).tiled([tiles; 2]);
+    field.spacing = [10.0, 10.0];
+    let path = paths::find("circle").expect("a named path");
+    let views = path.views(&field, FRAMES, [640, 480], Tolerance { px: 1.0, metric: Metric::Certified });
+    (Arc::new(field), views)
+}
+
+/// The levels by distance, `page` cells along a side of a page.
+fn uniform(edge_px: f64, page: u32) -> [(&'static str, String); 3] {
+    [("level", "uniform".to_string()), ("edge", edge_px.to_string()), ("page", page.to_string())]
+}
+
+/// What a page costs beside its triangles, of which each costs `slope` seconds: the same land in pages of two sizes.
+fn cost_of_a_page((field, views): &(Arc<Field>, Vec<View>), slope: f64) {
+    let [small, large] = [16, 64].map(|page| series(field, "sorted-strips:serial", &uniform(400.0, page), views));
+    let [triangles, seconds, pages] = [0, 1, 2].map(|k| small[k] - large[k]);
+    println!(
+        "{:.2} us a page ({:.0} and {:.0} pages)",
+        1e6 * (seconds - slope * triangles) / pages,
+        small[2],
+        large[2]
+    );
 }
 
 fn main() {
-    let mut field = synth::synth(synth::Kind::Eroded, [512, 512], 7).tiled([8, 8]);
-    field.spacing = [10.0, 10.0];
-    let field = Arc::new(field);
-    let path = paths::find("circle").expect("a named path");
-    let views = path.views(&field, FRAMES, [640, 480], Tolerance { px: 1.0, metric: Metric::Certified });
-    let [serial, parallel] = ["sorted-strips:serial", "sorted-strips"].map(|name| {
-        let of_edge = |edge: f64| {
-            let settings = [("level", "uniform".to_string()), ("edge", edge.to_string())];
-            series(&field, name, &settings, &views)
-        };
-        let points = EDGES.map(of_edge);
-        report(&format!("{name}, uniform"), &points);
-        points
+    let (near, wide) = (scene(2), scene(8));
+    let figure_5 = ["sorted-strips:serial", "sorted-strips"].map(|name| {
+        let few = FEW_EDGES_PX.map(|edge_px| series(&near.0, name, &uniform(edge_px, 64), &near.1));
+        let many = EDGES_PX.map(|edge_px| series(&wide.0, name, &uniform(edge_px, 64), &wide.1));
+        let points: Vec<_> = few.into_iter().chain(many).map(|[triangles, seconds, _]| [triangles, seconds]).collect();
+        (report(&format!("{name}, uniform"), &points), points)
     });
-    println!("on all cores");
-    for (one, all) in serial.iter().zip(&parallel) {
-        println!("  {:10.0} triangles {:5.2} times as fast", one.triangles, one.seconds / all.seconds);
+    let [(slope, serial), (_, parallel)] = &figure_5;
+    for (serial, parallel) in serial.iter().zip(parallel) {
+        println!("{:10.0} triangles: parallel {:.2} times as fast", serial[0], serial[1] / parallel[1]);
     }
-    println!("serial, uniform, pages of 256, 64 and 16 cells");
-    cost_of_a_page(&field, &views);
+    cost_of_a_page(&wide, *slope);
     let at = |px: f64| {
-        let views: Vec<_> =
-            views.iter().map(|view| View { tolerance: Tolerance { px, ..view.tolerance }, ..*view }).collect();
-        series(&field, "sorted-strips:serial", &[], &views)
+        let of_px = |view: &View| View { tolerance: Tolerance { px, ..view.tolerance }, ..*view };
+        let views: Vec<_> = wide.1.iter().map(of_px).collect();
+        let [triangles, seconds, _] = series(&wide.0, "sorted-strips:serial", &[], &views);
+        [triangles, seconds]
     };
-    report("sorted-strips:serial, certified", &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0].map(at));
+    report("sorted-strips:serial, certified", &[32.0, 16.0, 8.0, 4.0, 2.0].map(at));
 }
