@@ -4,6 +4,7 @@ mod archive;
 mod asc;
 mod bil;
 pub mod bounds;
+pub mod cave;
 mod cuts;
 pub mod demo;
 mod envi;

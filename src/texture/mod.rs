@@ -1,4 +1,6 @@
-//! Textures made at start: the same bytes on every machine.
+//! Textures: those made at start, the same bytes on every machine, and a picture cut into pages' maps.
 
 pub mod detail;
 mod noise;
+pub mod page_maps;
+pub mod working_set;

@@ -124,6 +124,32 @@ fn export_writes_meshes_that_others_read() {
     assert_eq!(faces as u64, coarse["triangles"].as_u64().unwrap());
 }
 
+/// Every edge joins as many triangles one way as the other way, but at the field's rim.
+#[test]
+fn an_exported_cave_is_closed() {
+    let folder = folder();
+    for kind in ["cave-floor", "cave-ceiling"] {
+        synth(folder.path(), kind, "129x97", &format!("{kind}.tif"));
+    }
+    let args = ["export", "cave-floor.tif", "--ceiling", "cave-ceiling.tif", "-o", "cave.obj"];
+    let counts = json(folder.path(), &[&args[..], &["--technique", "sorted-strips"]].concat());
+    assert!(counts["triangles"].as_u64().unwrap() > 2000);
+    let obj = std::fs::read_to_string(folder.path().join("cave.obj")).unwrap();
+    let lines = |first: &str| obj.lines().filter_map(move |line| line.strip_prefix(first)).collect::<Vec<_>>();
+    let vertices: Vec<Vec<f64>> =
+        lines("v ").iter().map(|line| line.split(' ').map(|n| n.parse().unwrap()).collect()).collect();
+    let mut balance = std::collections::HashMap::new();
+    for face in lines("f ") {
+        let corners: Vec<usize> = face.split(' ').map(|k| k.parse::<usize>().unwrap() - 1).collect();
+        for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
+            *balance.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
+        }
+    }
+    let is_rim = |k: usize| [0.0, 128.0].contains(&vertices[k][0]) || [0.0, 96.0].contains(&vertices[k][2]);
+    let open: Vec<_> = balance.iter().filter(|(_, balance)| **balance != 0).map(|(edge, _)| *edge).collect();
+    assert!(!open.is_empty() && open.iter().all(|&(a, b)| is_rim(a) && is_rim(b)), "{} open edges", open.len());
+}
+
 #[test]
 fn wrong_use_is_one_line_and_exit_code_2() {
     let folder = folder();
@@ -142,6 +168,7 @@ fn wrong_use_is_one_line_and_exit_code_2() {
     refused(at, &["info", "demo", "--crop", "0,0,5000,5"], &["crop"]);
     refused(at, &["info", "demo", "--max-samples", "1000"], &["--max-samples"]);
     refused(at, &["export", "demo", "-o", "m.stl"], &["m.stl", ".ply"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--ceiling", "demo"], &["--ceiling", "sorted-strips", "geomipmap"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--technique", "magic"], &["magic", "geomipmap"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--technique", "geomipmap:magic"], &["magic", "draw-per-block"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--set", "block=66"], &["block=66", "65"]);

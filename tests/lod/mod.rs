@@ -7,6 +7,7 @@ mod morph;
 mod skirts;
 mod smooth_tiles;
 mod strips;
+mod strips_cave;
 mod strips_order;
 
 use std::sync::Arc;

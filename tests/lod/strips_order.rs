@@ -17,17 +17,17 @@ use rayon::prelude::*;
 use super::technique;
 
 /// Pixels of a small picture.
-const SIZE: [u32; 2] = [48, 32];
+pub(super) const SIZE: [u32; 2] = [48, 32];
 
 /// What the rays of a picture's pixels meet.
 #[derive(Debug, Default, Clone, Copy)]
-struct Met {
+pub(super) struct Met {
     /// Pixels with land.
     land: usize,
     /// Pixels whose ray meets several triangles.
-    several: usize,
+    pub(super) several: usize,
     /// Of these, those whose triangles do not come nearest first.
-    unsorted: usize,
+    pub(super) unsorted: usize,
     /// Pixels that show another triangle without a depth buffer, drawn back to front.
     wrong: usize,
 }
@@ -71,7 +71,7 @@ fn distance(corners: &[DVec3; 3], (from, towards): (DVec3, DVec3)) -> Option<f64
 }
 
 /// Follows the ray of every pixel through triangles that come nearest first.
-fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> Met {
+pub(super) fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> Met {
     let corners: Vec<[DVec3; 3]> =
         triangles.iter().map(|t| t.corners.map(|c| field.world_at(c.x.into(), c.z.into(), c.y.into()))).collect();
     let pixels = (0..SIZE[0] * SIZE[1]).into_par_iter();

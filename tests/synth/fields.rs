@@ -48,6 +48,8 @@ fn same_seed_same_bytes() {
         (Kind::Spike, "9eeefd93b8897602"),
         (Kind::Ridge, "858d48eb4afd4442"),
         (Kind::Peers, "8384a453c5ccaf01"),
+        (Kind::CaveFloor, "538f498b956dd835"),
+        (Kind::CaveCeiling, "fe68efcc5cf5be87"),
     ];
     let found = pinned.map(|(kind, _)| (kind, hash(make(kind, [65, 33], 7).samples())[..16].to_string()));
     assert_eq!(found, pinned.map(|(kind, hash)| (kind, hash.to_string())));
@@ -55,7 +57,7 @@ fn same_seed_same_bytes() {
 
 #[test]
 fn another_seed_another_field() {
-    for kind in [Kind::Fractal, Kind::Eroded, Kind::Spike, Kind::Peers] {
+    for kind in [Kind::Fractal, Kind::Eroded, Kind::Spike, Kind::Peers, Kind::CaveFloor, Kind::CaveCeiling] {
         let [a, b, c] = [1, 2, 1 << 40].map(|seed| make(kind, [65, 33], seed));
         assert_ne!(a.samples(), b.samples(), "{kind}");
         assert_ne!(a.samples(), c.samples(), "{kind}: the upper half of the seed counts");
@@ -115,4 +117,14 @@ fn eroded_land_has_no_pits() {
         let lowest = around.map(|(a, b)| field.height(a, b)).fold(f32::INFINITY, f32::min);
         assert!(lowest <= field.height(i, j), "({i}, {j})");
     }
+}
+
+/// Passages and rock, both a good part of it.
+#[test]
+fn a_cave_has_a_floor_a_ceiling_and_rock() {
+    let [floor, ceiling] = [Kind::CaveFloor, Kind::CaveCeiling].map(|kind| make(kind, [257, 257], 2));
+    let open = heights(&floor).zip(heights(&ceiling)).filter(|(low, high)| high > low).count() as f64;
+    let highest = heights(&floor).zip(heights(&ceiling)).map(|(low, high)| high - low).fold(0.0, f32::max);
+    assert!((0.2..0.7).contains(&(open / 257.0 / 257.0)), "{open} samples are open");
+    assert!((8.0..20.0).contains(&highest), "{highest} m high");
 }

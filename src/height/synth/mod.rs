@@ -1,6 +1,7 @@
 //! Height fields from a formula. The same seed gives the same bytes on every machine: only integer hashing and
 //! + − × ÷ sqrt floor of f64 in a written order, and threads only where no value depends on another.
 
+mod cave;
 mod eroded;
 pub mod flow;
 mod fractal;
@@ -36,6 +37,10 @@ pub enum Kind {
     Ridge,
     /// The field on which other renderers were measured.
     Peers,
+    /// The floor of a cave.
+    CaveFloor,
+    /// The ceiling of the cave with the floor of the same size and seed.
+    CaveCeiling,
 }
 
 /// One line of [`KINDS`].
@@ -61,6 +66,8 @@ pub const KINDS: &[Entry] = &[
     Entry { kind: Kind::Spike, name: "spike", about: "one sample of 100000 m on a plain, its place by the seed", make: plain::spike },
     Entry { kind: Kind::Ridge, name: "ridge", about: "a wall of 300 m, one sample wide, aslant across a plain", make: plain::ridge },
     Entry { kind: Kind::Peers, name: "peers", about: "the fractal field that other renderers were measured on", make: peers::peers },
+    Entry { kind: Kind::CaveFloor, name: "cave-floor", about: "the floor of winding passages", make: cave::floor },
+    Entry { kind: Kind::CaveCeiling, name: "cave-ceiling", about: "the ceiling over the cave-floor of the same seed, below it in the rock", make: cave::ceiling },
 ];
 
 /// The field of a kind, `size` samples along (x, z), at least 2 × 2.

@@ -26,6 +26,7 @@
 //!
 //! Laws kept: watertight, covered once, error within tolerance (`level=certified`), no state between views.
 
+pub mod cave;
 pub mod certified;
 pub mod footprint;
 pub mod join;

@@ -20,6 +20,7 @@
 //!
 //! Surfaces with skirts have gaps between edges, which [`prove_with_skirts`] finds and shows hidden instead of 2 to 4.
 
+pub mod cave;
 mod edges;
 pub mod plan;
 mod seams;

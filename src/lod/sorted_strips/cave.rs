@@ -1,0 +1,251 @@
+//! Two fields in one stream: the floor and the ceiling of a cave, interleaved in the order of sight.
+//!
+//! Finch & Bishop name it as an extension: a second height field, whose triangles face down. Both are walked at once,
+//! over one set of split squares that keeps the bound for each of them, so that a ceiling's triangle lies over each
+//! floor's. Then:
+//! - **order**: rays meet such pairs one by one, as they meet the quads of one field, and within a pair the ceiling comes
+//!   first where the eye is above its plane, the floor elsewhere. A ray that leaves the eye between the two meets one of
+//!   them only: nothing has to be sorted;
+//! - **seam**: a vertex of rock ([`Cave`]) is one vertex for both. Triangles with three such are left out, and where they
+//!   were floor and ceiling end in the same edge, whatever the levels are.
+//!
+//! The bound is that of each surface from its own welded samples. Where a coarse triangle is left out although there is a
+//! cave below it, floor and ceiling are both within their bounds of where it was: the cave closes there.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::certified::{Certified, bounds};
+use super::footprint::Footprint;
+use super::measure::Errors;
+use super::pages::{Gaze, Grid, Pages, Row};
+use super::shapes::Shapes;
+use super::splits::Splits;
+use super::walk::{Ground, Stream, Worker};
+use super::{MOST_PAGES, MOST_TRIANGLES, WIDENING, turn_round};
+use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
+use crate::height::Field;
+use crate::height::cave::Cave;
+use crate::lod::{Settings, Technique};
+use crate::view::{Containment, Lens, View};
+
+/// Sorted strips over a floor and a ceiling.
+pub struct CaveStrips {
+    cave: Arc<Cave>,
+    /// Of floor and ceiling.
+    errors: [Errors; 2],
+    /// By page: whether there is anything but rock.
+    is_open: Vec<bool>,
+    shapes: Shapes,
+    pages: Pages,
+    splits: Splits,
+    /// One a row of pages.
+    rows: Vec<RowWorker>,
+    is_back_to_front: bool,
+    limits: Limits,
+    nothing: Geometry,
+}
+
+/// What a row is made with.
+#[derive(Default)]
+struct RowWorker {
+    worker: Worker,
+    pairs: Pairs,
+}
+
+impl CaveStrips {
+    /// Measures both fields. Of the room's settings it takes `page` and `order`; levels are certified.
+    pub fn new(cave: Arc<Cave>, settings: &Settings) -> Self {
+        let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MOST_PAGES);
+        let (pages, cells) = (grid.count[0] as usize * grid.count[1] as usize, grid.side() as usize);
+        let rows = grid.count[0].max(grid.count[1]) as usize;
+        let limits = Limits {
+            draws: rows,
+            instances: rows,
+            vertices: (2 * pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
+            indices: 3 * (4 * pages * cells * cells).min(MOST_TRIANGLES),
+            upload_bytes: 0,
+        };
+        Self {
+            errors: [cave.floor(), cave.ceiling()].map(|field| Errors::new(field, grid.level)),
+            is_open: (0..pages as u32).into_par_iter().map(|k| is_open(&cave, &grid, k)).collect(),
+            cave,
+            shapes: Shapes::default(),
+            pages: Pages::none(grid),
+            splits: Splits::new(grid),
+            rows: Vec::new(),
+            is_back_to_front: settings.word("order") == "back",
+            limits,
+            nothing: Geometry::default(),
+        }
+    }
+
+    /// Finds the pages in sight.
+    fn look(&mut self, view: &View) {
+        let (field, grid, errors) = (self.cave.floor(), self.pages.grid, &self.errors);
+        let (mut seen, frustum) = (Vec::new(), view.frustum());
+        let range = joined(errors.each_ref().map(Errors::range));
+        Footprint::new(field, view, range).visit_pages(&grid, |at| {
+            let range = joined(errors.each_ref().map(|errors| errors.square(grid.level, at).range));
+            let is_open = grid.index(at).is_some_and(|k| self.is_open[k]);
+            if is_open && frustum.contains(&bounds(field, grid.level, at, range)) != Containment::Outside {
+                seen.push(at);
+            }
+        });
+        self.pages.set(seen);
+    }
+
+    /// Splits what either field needs; `false` if that is too much for any frame.
+    fn split(&mut self, view: &View) -> bool {
+        self.splits.clear();
+        // A split square has at least six triangles more, floor and ceiling twice as many.
+        let most = self.limits.indices / 18 + 1;
+        [self.cave.floor(), self.cave.ceiling()]
+            .into_iter()
+            .zip(&self.errors)
+            .all(|(field, errors)| Certified::new(field, errors, &self.pages, view, most).split(&mut self.splits))
+    }
+
+    /// Walks the rows of a frame; `false` if they do not fit.
+    fn walk(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> bool {
+        let (field, sight) = (&**self.cave.floor(), Sight::new(self.cave.floor(), view));
+        let (pages, levels, shapes) = (&self.pages, &self.splits, &self.shapes);
+        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: false };
+        rows.par_iter().zip(&mut self.rows).for_each(|(row, RowWorker { worker, pairs })| {
+            worker.stream.clear();
+            ground.walk_on(row, worker);
+            pairs.fill(&self.cave, &sight, &worker.stream);
+        });
+        let made = || self.rows[..rows.len()].iter().map(|row| &row.pairs.stream);
+        made().map(|s| s.vertices.len()).sum::<usize>() <= self.limits.vertices
+            && made().map(|s| s.indices.len()).sum::<usize>() <= self.limits.indices
+    }
+
+    fn fill(&self, rows: usize, list: &mut DrawList) {
+        for (batch, Stream { vertices, indices }) in (0u32..).zip(self.rows[..rows].iter().map(|row| &row.pairs.stream))
+        {
+            let (base, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
+            list.streamed.vertices.extend_from_slice(vertices);
+            list.streamed.indices.extend(indices.iter().map(|k| base + k));
+            list.instances.push(Instance { batch, ..Instance::default() });
+            let (source, topology) = (Source::Streamed, Topology::Triangles);
+            let (indices, instances) = (first..list.streamed.indices.len() as u32, batch..batch + 1);
+            list.draws.push(Draw { source, topology, indices, instances, first_vertex: 0 });
+        }
+        if self.is_back_to_front {
+            turn_round(list);
+        }
+    }
+}
+
+impl Technique for CaveStrips {
+    fn resident(&self) -> &Geometry {
+        &self.nothing
+    }
+
+    fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.look(view);
+        let gaze = Gaze::new(self.cave.floor(), view);
+        let rows = self.pages.rows(&gaze);
+        self.rows.resize_with(rows.len().max(self.rows.len()), RowWorker::default);
+        let mut wider = *view;
+        while !(self.split(&wider) && self.walk(&wider, &gaze, &rows)) {
+            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+            list.widening *= WIDENING;
+        }
+        self.fill(rows.len(), list);
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        let open = self.is_open.iter().filter(|is_open| **is_open).count();
+        let bytes = self.errors.iter().map(Errors::bytes).sum::<usize>();
+        vec![("pages", open as f64, ""), ("bytes of errors", bytes as f64, "B")]
+    }
+}
+
+fn joined([a, b]: [[f32; 2]; 2]) -> [f32; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Whether a page holds anything but rock.
+fn is_open(cave: &Cave, grid: &Grid, page: u32) -> bool {
+    let at = [page % grid.count[0], page / grid.count[0]];
+    let samples = |k: usize| at[k] << grid.level..=((at[k] + 1) << grid.level).min(grid.last[k] as u32);
+    samples(1).any(|j| samples(0).any(|i| !cave.is_rock(i, j)))
+}
+
+/// Where rays come from, in samples and metres: a point, or a direction that they come from.
+struct Sight {
+    from: [f64; 3],
+    is_point: bool,
+}
+
+impl Sight {
+    fn new(field: &Field, view: &View) -> Self {
+        let ([dx, dz], [x, z]) = (field.spacing, field.origin);
+        let (eye, forward) = (view.eye, view.forward());
+        match view.lens {
+            Lens::Perspective { .. } => Self { from: [(eye.x - x) / dx, eye.y, (eye.z - z) / dz], is_point: true },
+            Lens::Orthographic { .. } => Self { from: [-forward.x / dx, -forward.y, -forward.z / dz], is_point: false },
+        }
+    }
+
+    /// Whether rays come from above the plane of a triangle that faces up.
+    fn is_above(&self, triangle: [&ExplicitVertex; 3]) -> bool {
+        let [a, b, c] = triangle.map(|v| [f64::from(v.position[0]), f64::from(v.height), f64::from(v.position[1])]);
+        let from_a = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
+        let ([bx, by, bz], [cx, cy, cz]) = (from_a(b), from_a(c));
+        let [x, y, z] = if self.is_point { from_a(self.from) } else { self.from };
+        x * (by * cz - bz * cy) + y * (bz * cx - bx * cz) + z * (bx * cy - by * cx) > 0.0
+    }
+}
+
+/// A row of a floor, and the ceiling over it.
+#[derive(Default)]
+struct Pairs {
+    stream: Stream,
+    /// By vertex of the floor: the ceiling's over it, the same one at rock.
+    over: Vec<u32>,
+}
+
+impl Pairs {
+    fn fill(&mut self, cave: &Cave, sight: &Sight, floor: &Stream) {
+        let Self { stream: Stream { vertices, indices }, over } = self;
+        vertices.clear();
+        vertices.extend_from_slice(&floor.vertices);
+        over.clear();
+        indices.clear();
+        for (k, vertex) in (0u32..).zip(&floor.vertices) {
+            let [i, j] = vertex.position.map(|n| n as u32);
+            if cave.is_rock(i, j) {
+                over.push(k);
+            } else {
+                let height = cave.ceiling().height(i, j);
+                over.push(vertices.len() as u32);
+                vertices.push(ExplicitVertex { height, target: height, ..*vertex });
+            }
+        }
+        let is_flat = |t: &[u32; 3]| {
+            let [[ax, az], [bx, bz], [cx, cz]] = t.map(|k| floor.vertices[k as usize].position.map(i64::from));
+            (bx - ax) * (cz - az) == (bz - az) * (cx - ax)
+        };
+        for low in floor.indices.as_chunks::<3>().0 {
+            let high = low.map(|k| over[k as usize]);
+            if *low == high || is_flat(low) {
+                continue;
+            }
+            let down = [high[0], high[2], high[1]];
+            let is_above = sight.is_above(high.map(|k| &vertices[k as usize]));
+            indices.extend(if is_above { [down, *low] } else { [*low, down] }.as_flattened());
+        }
+    }
+}
