@@ -3,4 +3,4 @@
 pub mod detail;
 mod noise;
 pub mod page_maps;
-pub mod working_set;
+pub mod resident_maps;

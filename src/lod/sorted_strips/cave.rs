@@ -111,7 +111,7 @@ impl CaveStrips {
     fn walk(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> bool {
         let (field, sight) = (&**self.cave.floor(), Sight::new(self.cave.floor(), view));
         let (pages, levels, shapes) = (&self.pages, &self.splits, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, major: gaze.major, eye: gaze.eye, blends: false };
+        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: false };
         rows.par_iter().zip(&mut self.rows).for_each(|(row, RowWorker { worker, pairs })| {
             worker.stream.clear();
             ground.walk_on(row, worker);

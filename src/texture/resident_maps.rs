@@ -2,8 +2,8 @@
 //! within a number of bytes.
 //!
 //! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8: a page that comes into view is drawn with
-//! what is there, and what it should be drawn with is loaded meanwhile. A frame is a call of [`WorkingSet::begin`], one of
-//! [`WorkingSet::choose`] for each page in sight, nearest first, and one of [`WorkingSet::finish`].
+//! what is there, and what it should be drawn with is loaded meanwhile. A frame is a call of [`ResidentMaps::begin`], one of
+//! [`ResidentMaps::choose`] for each page in sight, nearest first, and one of [`ResidentMaps::finish`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use super::page_maps::{Map, PageMaps, Texel};
 
 /// The maps in memory.
-pub struct WorkingSet {
+pub struct ResidentMaps {
     maps: Arc<PageMaps>,
     budget_bytes: u64,
     /// Of all maps in memory, and of those that the worker makes.
@@ -61,7 +61,7 @@ impl fmt::Display for TooSmall {
 
 impl std::error::Error for TooSmall {}
 
-impl WorkingSet {
+impl ResidentMaps {
     /// The coarsest map of each page, within `budget_bytes`.
     ///
     /// # Errors
@@ -233,7 +233,7 @@ mod tests {
         pages.into_iter().map(|page| Map { page, level: distance(&page) as u32 }).collect()
     }
 
-    fn frame(set: &mut WorkingSet, wanted: &[Map]) -> Vec<Map> {
+    fn frame(set: &mut ResidentMaps, wanted: &[Map]) -> Vec<Map> {
         set.begin();
         let chosen: Vec<_> = wanted.iter().map(|map| set.choose(*map)).collect();
         assert!(chosen.iter().all(|map| set.texels(*map).is_some()), "maps to draw with that are not there");
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn a_page_is_coarse_until_its_finer_map_is_there() {
         let maps = maps();
-        let mut set = WorkingSet::new(Arc::clone(&maps), 1 << 20).unwrap();
+        let mut set = ResidentMaps::new(Arc::clone(&maps), 1 << 20).unwrap();
         let wanted = Map { page: [3, 5], level: 1 };
         let coarsest = Map { level: 4, ..wanted };
         assert_eq!(frame(&mut set, &[wanted]), [coarsest]);
@@ -264,7 +264,7 @@ mod tests {
     fn the_budget_is_never_exceeded() {
         for budget in [COARSEST, COARSEST + 400, COARSEST + 3 * FINEST, COARSEST + 10 * FINEST, 1 << 20] {
             let maps = maps();
-            let mut set = WorkingSet::new(Arc::clone(&maps), budget).unwrap();
+            let mut set = ResidentMaps::new(Arc::clone(&maps), budget).unwrap();
             for step in 0..400u32 {
                 let jump = if step % 50 == 49 { 4.0 } else { 0.0 };
                 let at = [f64::from(step % 80) / 10.0, (f64::from(step) / 57.0 + jump) % 8.0];
@@ -290,7 +290,7 @@ mod tests {
         let wanted = levels_around([4.0, 4.0]);
         let needed: u64 = wanted.iter().filter(|map| map.level < 4).map(|map| maps.bytes(map.level)).sum();
         for (budget, all) in [(COARSEST + needed, true), (COARSEST + needed / 2, false)] {
-            let mut set = WorkingSet::new(Arc::clone(&maps), budget).unwrap();
+            let mut set = ResidentMaps::new(Arc::clone(&maps), budget).unwrap();
             for before in [[0.0, 0.0], [7.0, 1.0]] {
                 frame(&mut set, &levels_around(before));
                 set.wait();
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn a_budget_below_the_coarsest_maps_is_refused() {
-        let refused = WorkingSet::new(maps(), COARSEST - 1).err();
+        let refused = ResidentMaps::new(maps(), COARSEST - 1).err();
         assert_eq!(refused, Some(TooSmall { budget: COARSEST - 1, needed: COARSEST }));
     }
 }
