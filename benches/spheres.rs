@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cuesta::height::synth;
+use cuesta::lod::sphere_tree::covers::Covers;
 use cuesta::lod::sphere_tree::front::{Follower, Watch};
 use cuesta::lod::sphere_tree::measure::Measured;
 use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
@@ -136,6 +137,7 @@ fn main() {
             let mut bounded = Follower::<Queues>::new(&measured);
             bounded.watch().largest_speed = FAST_M;
             print("spheres", &following(Follower::<Shells>::new(&measured), &measured, &path, reach));
+            print("spheres with covers", &following(Follower::<Covers>::new(&measured), &measured, &path, reach));
             print("ROAM, way gone", &following(Follower::<Queues>::new(&measured), &measured, &path, reach));
             print("ROAM, largest speed", &following(bounded, &measured, &path, reach));
             print("plain", &plain(&measured, &path, reach));

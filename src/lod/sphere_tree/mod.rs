@@ -4,8 +4,9 @@
 //! above the tolerance when the eye is near enough has a sphere around it: inside it splits, outside it merges. Two
 //! wedges that share a hypotenuse split together, so one sphere serves both, about the middle of that hypotenuse
 //! ([`lattice`]). What has split is thus a function of the eye's place alone. Which spheres it may have crossed is found
-//! in three ways, with the same triangles: made-up spheres about the viewpoint that group those it cannot have crossed
-//! ([`shells`]); ROAM's two queues ([`roam`]); and every sphere anew ([`splits`]).
+//! in four ways, with the same triangles: made-up spheres about the viewpoint that group those it cannot have crossed
+//! ([`shells`]); the same for those that lie behind no other one, as the lecture has it, which costs more than it saves
+//! ([`covers`]); ROAM's two queues ([`roam`]); and every sphere anew ([`splits`]).
 //!
 //! Where this differs from the lecture, and why:
 //! - the lecture's functions are its application's; here a sphere's radius follows from an error measured at every
@@ -20,6 +21,7 @@
 //! Laws kept: watertight, covered once, error within tolerance, no state between views (`hold=off`).
 
 pub mod blocks;
+pub mod covers;
 pub mod front;
 pub mod lattice;
 pub mod measure;
@@ -32,6 +34,7 @@ pub mod splits;
 use std::sync::Arc;
 
 use self::blocks::Blocks;
+use self::covers::Covers;
 use self::front::Follower;
 use self::measure::Measured;
 use self::mesh::Mesh;
@@ -62,9 +65,9 @@ pub const ENTRY: Entry = Entry {
     settings: &[
         Setting {
             key: "criterion",
-            values: Values::Words(&["spheres", "roam", "plain"]),
+            values: Values::Words(&["spheres", "covers", "roam", "plain"]),
             default: "spheres",
-            about: "how crossed spheres are found: by made-up ones, by two queues, or among all; the same triangles",
+            about: "how crossed spheres are found: by made-up ones, behind others, by two queues, or among all; same triangles",
         },
         Setting {
             key: "morph",
@@ -85,6 +88,7 @@ pub const ENTRY: Entry = Entry {
 /// How the split diamonds are found.
 enum Criterion {
     Spheres(Follower<Shells>),
+    Covers(Follower<Covers>),
     Roam(Follower<Queues>),
     Plain { splits: Splits, found: Found },
 }
@@ -103,6 +107,7 @@ impl Criterion {
     fn follow(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
         match self {
             Criterion::Spheres(follower) => follower.follow(measured, from, most),
+            Criterion::Covers(follower) => follower.follow(measured, from, most),
             Criterion::Roam(follower) => follower.follow(measured, from, most),
             Criterion::Plain { splits, found } => splits.refill(measured, from, found, most),
         }
@@ -111,6 +116,7 @@ impl Criterion {
     fn splits(&self) -> &Splits {
         match self {
             Criterion::Spheres(follower) => follower.splits(),
+            Criterion::Covers(follower) => follower.splits(),
             Criterion::Roam(follower) => follower.splits(),
             Criterion::Plain { splits, .. } => splits,
         }
@@ -119,6 +125,7 @@ impl Criterion {
     fn visited(&self) -> usize {
         match self {
             Criterion::Spheres(follower) => follower.visited(),
+            Criterion::Covers(follower) => follower.visited(),
             Criterion::Roam(follower) => follower.visited(),
             Criterion::Plain { found, .. } => found.visited,
         }
@@ -132,6 +139,7 @@ impl SphereTree {
         let blocks = Blocks::new(&measured.field, &measured.lattice);
         let criterion = match settings.word("criterion") {
             "spheres" => Criterion::Spheres(Follower::new(&measured)),
+            "covers" => Criterion::Covers(Follower::new(&measured)),
             "roam" => Criterion::Roam(Follower::new(&measured)),
             _ => Criterion::Plain { splits: Splits::none(&measured), found: Found::default() },
         };

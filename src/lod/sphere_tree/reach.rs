@@ -76,7 +76,7 @@ impl Viewpoint {
     /// have, infinite if it never does.
     #[inline]
     pub fn slack(&self, known: &Known, is_split: bool) -> f64 {
-        let radius = self.reach.radius(known) * self.band;
+        let radius = self.radius(known, is_split);
         match is_split {
             _ if radius == f64::INFINITY => {
                 if is_split {
@@ -85,11 +85,17 @@ impl Viewpoint {
                     -radius
                 }
             }
-            true => radius * self.hold - known.centre.distance(self.eye),
+            true => radius - known.centre.distance(self.eye),
             false if radius < 0.0 => f64::INFINITY,
             // On a sphere is outside.
             false => (known.centre.distance(self.eye) - radius).next_up(),
         }
+    }
+
+    /// The radius of the sphere in which a diamond splits, or outside of which it merges if it has split, metres.
+    #[inline]
+    pub fn radius(&self, known: &Known, is_split: bool) -> f64 {
+        self.reach.radius(known) * self.band * if is_split { self.hold } else { 1.0 }
     }
 
     /// How far a vertex still has to go from where its diamond's hypotenuse was, 1 to 0.

@@ -42,6 +42,7 @@ pub struct Shells {
     empty: Vec<u32>,
     /// Way of the viewpoint, metres, upon which a nest's innermost shell may be crossed, as the bits of a float.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
+    eye: DVec3,
     /// Way of the viewpoint so far, metres.
     way: f64,
 }
@@ -58,7 +59,7 @@ impl Shells {
             self.nests.len() as u32 - 1
         });
         std::mem::swap(&mut self.nests[number as usize], &mut self.current);
-        self.await_innermost(number, self.nests[number as usize].centre);
+        self.await_innermost(number, self.eye);
     }
 
     fn await_innermost(&mut self, number: u32, eye: DVec3) {
@@ -76,10 +77,9 @@ impl Watch for Shells {
 
     fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, visited: &mut usize) {
         self.close_current();
-        self.way += self.current.centre.distance(from.eye) * (1.0 + 1e-9);
-        self.current.centre = from.eye;
-        while let Some(&Reverse((way, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.way) {
-            debug_assert!(f64::from_bits(way) <= self.way);
+        self.way += self.eye.distance(from.eye) * (1.0 + 1e-9);
+        self.eye = from.eye;
+        while let Some(&Reverse((_, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.way) {
             self.queue.pop();
             *visited += 1;
             let nest = &mut self.nests[number as usize];
@@ -91,7 +91,7 @@ impl Watch for Shells {
     }
 
     fn place(&mut self, front: &mut Front, ticket: Ticket, _known: &Known, _is_split: bool, slack: f64) {
-        self.current.centre = front.from.eye;
+        (self.eye, self.current.centre) = (front.from.eye, front.from.eye);
         self.current.shells.push((slack.to_bits(), ticket));
     }
 }
