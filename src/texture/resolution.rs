@@ -71,7 +71,7 @@ mod tests {
         let [wrong, exceptions] = parts.map(of_part).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         assert_eq!(wrong, 0, "level {level}");
         // Every second power of two from 2^-149 to 2^127.
-        assert_eq!(exceptions, if level % 2 == 0 { 139 } else { 138 }, "level {level}");
+        assert_eq!(exceptions, if level.is_multiple_of(2) { 139 } else { 138 }, "level {level}");
     }
 
     #[test]

@@ -104,13 +104,25 @@ fn the_set_is_bounded_by_the_screen_and_spheres_find_it_within_a_level() {
     let stops = [Stop::Ends(5), Stop::Largest(5), Stop::Largest(8), Stop::Generated(5)];
     let mut sets = stops.map(|stop| WorkingSet::new(MAP_LEVEL, stop));
     let mut most = [[0.0f64; 2]; 4];
+    // Without wedges that the near plane cuts, which need the most there is.
+    let (mut far, mut most_far) = (WorkingSet::new(MAP_LEVEL, Stop::Ends(5)), 0.0f64);
     let (mut wedges, mut covered, mut apart) = ([usize::MAX, 0], 0.0f64, [0usize; 3]);
     let mut levels: HashMap<u64, i32> = HashMap::new();
     for frame in 0..1000 {
-        let view = flight.view(frame, 12.0);
+        let view = flight.view(frame, 20.0);
         let seen = flight.seen(&view);
         wedges = [wedges[0].min(seen.len()), wedges[1].max(seen.len())];
-        covered = covered.max(seen.iter().map(|s| s.area_px.max(0.0)).sum());
+        let area: f64 = seen.iter().map(|s| s.area_px.max(0.0)).sum();
+        covered = covered.max(area);
+        far.begin();
+        seen.iter().filter(|s| !s.is_near).for_each(|s| {
+            far.show(s.key, &s.wedge, s.area_px as f32, false);
+        });
+        far.end();
+        // A wedge is a quarter of its smallest node or more, and a texture has less than 4 times the texels it needs;
+        // the root's has 4^5 at most.
+        assert!(far.texels() <= 16.0 * area + 1024.0, "frame {frame}: {} texels for {area} pixels", far.texels());
+        most_far = most_far.max(far.texels() / area);
         for (set, most) in sets.iter_mut().zip(&mut most) {
             set.begin();
             seen.iter().for_each(|s| {
@@ -136,5 +148,7 @@ fn the_set_is_bounded_by_the_screen_and_spheres_find_it_within_a_level() {
     for (stop, [texels, nodes]) in stops.iter().zip(most) {
         println!("{stop:?}: at most {:.2} texels a pixel, {nodes} nodes", texels / screen);
     }
+    println!("without wedges at the near plane: at most {most_far:.2} texels a pixel of the wedges seen");
     println!("apart by 0, 1, more levels: {apart:?}");
+    assert!(apart[2] * 100_000 < apart[0] && apart[1] < apart[0], "{apart:?}");
 }
