@@ -13,5 +13,6 @@ mod profile;
 mod readme;
 mod report;
 mod synth;
+mod texture;
 #[cfg(feature = "viewer")]
 mod viewer;

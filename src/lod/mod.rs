@@ -9,6 +9,7 @@ pub mod geomipmap;
 pub mod settings;
 pub mod smooth_tiles;
 pub mod sorted_strips;
+pub mod sphere_tree;
 
 use std::sync::Arc;
 
@@ -100,8 +101,14 @@ pub struct Entry {
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
 /// benchmarks and the reports.
-pub const TECHNIQUES: &[Entry] =
-    &[brute_force::ENTRY, geomipmap::ENTRY, smooth_tiles::ENTRY, sorted_strips::ENTRY, clusters::ENTRY];
+pub const TECHNIQUES: &[Entry] = &[
+    brute_force::ENTRY,
+    geomipmap::ENTRY,
+    smooth_tiles::ENTRY,
+    sorted_strips::ENTRY,
+    sphere_tree::ENTRY,
+    clusters::ENTRY,
+];
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

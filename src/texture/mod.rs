@@ -1,6 +1,10 @@
-//! Textures: those made at start, the same bytes on every machine, and a picture cut into pages' maps.
+//! Textures: those made at start, the same bytes on every machine; a picture cut into pages' maps; and which part of a map
+//! a frame needs, how fine.
 
 pub mod detail;
+pub mod mip_spheres;
 mod noise;
 pub mod page_maps;
 pub mod resident_maps;
+pub mod resolution;
+pub mod working_set;

@@ -6,6 +6,7 @@ mod clusters;
 mod morph;
 mod skirts;
 mod smooth_tiles;
+mod sphere_tree;
 mod strips;
 mod strips_cave;
 mod strips_order;

@@ -1,0 +1,146 @@
+//! Blow 2000 again: wedges looked at and time for a frame's splits and merges, by made-up spheres, by ROAM's queues and
+//! among all, at 10⁴ to 10⁶ wedges, along a slow, a fast and a leaping path; and the exponent rule against a logarithm.
+//!
+//! ROAM stands here twice: its priorities wait for the way that the viewpoint has really gone, which is the best that
+//! they can, and for that at the largest speed it may have, as published: here the fast path's.
+//! `cargo bench --no-default-features --bench spheres`, while nothing else runs.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cuesta::height::synth;
+use cuesta::lod::sphere_tree::covers::Covers;
+use cuesta::lod::sphere_tree::front::{Follower, Watch};
+use cuesta::lod::sphere_tree::measure::Measured;
+use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
+use cuesta::lod::sphere_tree::roam::Queues;
+use cuesta::lod::sphere_tree::shells::Shells;
+use cuesta::lod::sphere_tree::splits::{Found, Splits};
+use cuesta::texture::resolution::{level_by_exponent, level_by_logarithm};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+
+/// Samples along a side, and metres between them.
+const SIDE: u32 = 2049;
+const SPACING_M: f64 = 10.0;
+/// Frames of a path that count, after as many that do not.
+const FRAMES: usize = 200;
+/// Metres a frame: a walk, and a flight at 300 m/s and 60 frames a second.
+const SLOW_M: f64 = 0.05;
+const FAST_M: f64 = 5.0;
+
+/// Medians and maxima of the counted frames.
+struct Row {
+    visited: [usize; 2],
+    time_us: [f64; 2],
+}
+
+fn reach(px: f64) -> Reach {
+    Reach::new(&View {
+        eye: DVec3::ZERO,
+        world_from_eye: View::turned(0.0, 0.0, 0.0),
+        lens: Lens::Perspective { fov_x: 1.2 },
+        size: [1280, 720],
+        near: 0.1,
+        tolerance: Tolerance { px, metric: Metric::Certified },
+        time_s: 0.0,
+    })
+}
+
+/// The tolerance, pixels, at which an eye sees so many wedges.
+fn tolerance(measured: &Measured, eye: DVec3, wedges: usize) -> f64 {
+    let (mut splits, mut found) = (Splits::none(measured), Found::default());
+    let [mut low, mut high] = [1e-3f64, 1e3];
+    for _ in 0..25 {
+        let px = (low * high).sqrt();
+        let from = Viewpoint { eye, reach: reach(px), band: 1.0, hold: 1.0 };
+        let fits = splits.refill(measured, &from, &mut found, wedges / 2);
+        *(if fits { &mut high } else { &mut low }) = px;
+    }
+    high
+}
+
+/// A path of eyes, a curve at a speed or leaps.
+fn path(measured: &Measured, step_m: Option<f64>) -> Vec<DVec3> {
+    let extent = f64::from(SIDE - 1) * SPACING_M;
+    let place = |k: usize| match step_m {
+        Some(step) => DVec3::new(0.4, 0.0, 0.45) * extent + DVec3::new(0.8, 0.0, 0.6) * step * k as f64,
+        None => DVec3::new((k as f64 * 0.618).fract(), 0.0, (k as f64 * 0.414).fract()) * extent,
+    };
+    let above = |at: DVec3| at + DVec3::Y * (measured.field.height_at(at.x, at.z).unwrap_or(0.0) + 30.0);
+    (0..2 * FRAMES).map(|k| above(place(k))).collect()
+}
+
+fn row(path: &[DVec3], reach: Reach, mut follow: impl FnMut(&Viewpoint) -> usize) -> Row {
+    let measured = path.iter().map(|&eye| {
+        let from = Viewpoint { eye, reach, band: 1.0, hold: 1.0 };
+        let start = Instant::now();
+        let visited = follow(&from);
+        (2 * visited, 1e6 * start.elapsed().as_secs_f64())
+    });
+    let frames: Vec<_> = measured.collect();
+    let (mut visited, mut times): (Vec<_>, Vec<_>) = frames[FRAMES..].iter().copied().unzip();
+    visited.sort_unstable();
+    times.sort_unstable_by(f64::total_cmp);
+    Row { visited: [visited[FRAMES / 2], visited[FRAMES - 1]], time_us: [times[FRAMES / 2], times[FRAMES - 1]] }
+}
+
+fn following<W: Watch>(mut follower: Follower<W>, measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
+    row(path, reach, |from| {
+        follower.follow(measured, from, usize::MAX);
+        follower.visited()
+    })
+}
+
+fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
+    let (mut splits, mut found) = (Splits::none(measured), Found::default());
+    row(path, reach, |from| {
+        splits.refill(measured, from, &mut found, usize::MAX);
+        found.visited
+    })
+}
+
+fn print(name: &str, Row { visited, time_us }: &Row) {
+    let ([visits, most], [us, longest]) = (visited, time_us);
+    println!("    {name:22} {visits:8} wedges (most {most:8}) {us:9.1} µs (longest {longest:9.1})");
+}
+
+fn logarithm_against_exponent() {
+    let areas: Vec<f32> = (0..1u32 << 16).map(|k| f32::from_bits(0x3f80_0000 + k * 1021)).collect();
+    let time = |level: &dyn Fn(f32, u32) -> i32| {
+        let once = |_| {
+            let start = Instant::now();
+            for (k, &area) in areas.iter().enumerate() {
+                black_box(level(black_box(area), k as u32 & 31));
+            }
+            start.elapsed().as_secs_f64() * 1e9 / areas.len() as f64
+        };
+        (0..50).map(once).fold(f64::INFINITY, f64::min)
+    };
+    let [slow, quick] = [time(&level_by_logarithm), time(&level_by_exponent)];
+    println!("texture level: {slow:.2} ns by logarithm, {quick:.2} ns by exponent, {:.1} times", slow / quick);
+}
+
+fn main() {
+    logarithm_against_exponent();
+    let mut field = synth::synth(synth::Kind::Fractal, [SIDE; 2], 7);
+    field.spacing = [SPACING_M; 2];
+    let measured = Measured::new(Arc::new(field), 1.0);
+    for wedges in [10_000, 100_000, 1_000_000] {
+        let start = path(&measured, Some(FAST_M))[FRAMES];
+        let px = tolerance(&measured, start, wedges);
+        println!("{wedges} wedges, {px:.2} px");
+        for (name, step) in [("slow", Some(SLOW_M)), ("fast", Some(FAST_M)), ("leaping", None)] {
+            let (path, reach) = (path(&measured, step), reach(px));
+            println!("  {name}");
+            let mut bounded = Follower::<Queues>::new(&measured);
+            bounded.watch().largest_speed = FAST_M;
+            print("spheres", &following(Follower::<Shells>::new(&measured), &measured, &path, reach));
+            print("spheres with covers", &following(Follower::<Covers>::new(&measured), &measured, &path, reach));
+            print("ROAM, way gone", &following(Follower::<Queues>::new(&measured), &measured, &path, reach));
+            print("ROAM, largest speed", &following(bounded, &measured, &path, reach));
+            print("plain", &plain(&measured, &path, reach));
+        }
+    }
+}

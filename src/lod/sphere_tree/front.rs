@@ -1,0 +1,259 @@
+//! The set of split diamonds kept from view to view: only what may have changed is looked at.
+//!
+//! What may change is the *front*: split diamonds of which no child has split, which may merge, and diamonds whose
+//! parents all have, which may split. All others wait behind them, since spheres are nested. Who looks after the front
+//! ([`Watch`]) says which of it the viewpoint may have crossed.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+use super::lattice::Place;
+use super::measure::{Known, Measured};
+use super::reach::Viewpoint;
+use super::splits::{Found, Splits};
+
+/// A place in the front at one time: index of the diamond and when it got its watch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ticket {
+    /// Index of the diamond.
+    pub index: u32,
+    /// No two tickets have the same.
+    pub number: u32,
+}
+
+/// A diamond of the front.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    /// Its middle.
+    pub at: Place,
+    /// Whether it has split.
+    pub is_split: bool,
+    /// Its ticket's number.
+    number: u32,
+}
+
+/// Multiplies: indices are spread well enough by that.
+#[derive(Default)]
+pub struct IndexHasher(u64);
+
+impl Hasher for IndexHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, _bytes: &[u8]) {
+        unreachable!("keys are u32")
+    }
+
+    fn write_u32(&mut self, key: u32) {
+        self.0 = (u64::from(key) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+    }
+}
+
+/// A map by index.
+pub type ByIndex<T> = HashMap<u32, T, BuildHasherDefault<IndexHasher>>;
+
+/// The front's members by index, with the surroundings that a watch may look at.
+pub struct Front<'a> {
+    /// Diamonds.
+    pub measured: &'a Measured,
+    /// The viewpoint.
+    pub from: &'a Viewpoint,
+    /// What has split.
+    pub splits: &'a Splits,
+    /// Members.
+    pub members: &'a ByIndex<Member>,
+    /// Diamonds looked at.
+    pub visited: &'a mut usize,
+}
+
+/// Who looks after the front.
+pub trait Watch: Default + Send {
+    /// Forgets all tickets.
+    fn clear(&mut self);
+
+    /// The viewpoint is now here: gives back the tickets of all that it may have crossed, maybe with stale ones.
+    fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, visited: &mut usize);
+
+    /// Looks after a member that the eye may move `slack` metres (above 0, finite) without crossing.
+    fn place(&mut self, front: &mut Front, ticket: Ticket, known: &Known, is_split: bool, slack: f64);
+
+    /// A member has left: gives back the tickets of those that relied on it.
+    fn left(&mut self, _index: u32, _tickets: &mut Vec<Ticket>) {}
+}
+
+/// A set of split diamonds that follows a viewpoint.
+pub struct Follower<W> {
+    splits: Splits,
+    members: ByIndex<Member>,
+    watch: W,
+    next_number: u32,
+    /// To look at: what may split, and what may merge.
+    fresh: [Vec<u32>; 2],
+    tickets: Vec<Ticket>,
+    last: Option<Viewpoint>,
+    visited: usize,
+    found: Found,
+}
+
+impl<W: Watch> Follower<W> {
+    /// Follows nothing yet.
+    pub fn new(measured: &Measured) -> Self {
+        Self {
+            splits: Splits::none(measured),
+            members: ByIndex::default(),
+            watch: W::default(),
+            next_number: 0,
+            fresh: [Vec::new(), Vec::new()],
+            tickets: Vec::new(),
+            last: None,
+            visited: 0,
+            found: Found::default(),
+        }
+    }
+
+    /// What has split.
+    pub fn splits(&self) -> &Splits {
+        &self.splits
+    }
+
+    /// Who looks after the front.
+    pub fn watch(&mut self) -> &mut W {
+        &mut self.watch
+    }
+
+    /// Diamonds looked at for the last viewpoint.
+    pub fn visited(&self) -> usize {
+        self.visited
+    }
+
+    /// Moves on to a viewpoint; `false` if more than `most` diamonds would have split: then nothing is followed.
+    pub fn follow(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+        self.visited = 0;
+        // Other spheres: all is to be looked at.
+        let is_same = |last: &Viewpoint| Viewpoint { eye: from.eye, ..*last } == *from;
+        if !self.last.as_ref().is_some_and(is_same) {
+            return self.start(measured, from, most);
+        }
+        if self.last.is_some_and(|last| last.eye == from.eye) {
+            return true;
+        }
+        self.last = Some(*from);
+        self.watch.due(from, &mut self.tickets, &mut self.visited);
+        // Where nearly all is to be looked at, the plain way is shorter.
+        if self.tickets.len() > 64 && self.tickets.len() > self.members.len() / 2 {
+            return self.start(measured, from, most);
+        }
+        self.redeem();
+        self.settle(measured, from, most)
+    }
+
+    fn start(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+        self.last = None;
+        self.tickets.clear();
+        self.members.clear();
+        self.watch.clear();
+        self.fresh.iter_mut().for_each(Vec::clear);
+        let mut found = std::mem::take(&mut self.found);
+        let fits = self.splits.refill(measured, from, &mut found, most);
+        self.visited += found.visited;
+        if fits {
+            self.last = Some(*from);
+            self.add_if_ready(measured, from, measured.lattice.root());
+            for &(at, index) in &found.split {
+                if !self.splits.is_needed(measured, at) {
+                    self.add(at, index, true);
+                }
+                measured.lattice.children(at).for_each(|(at, _)| self.add_if_ready(measured, from, Some(at)));
+            }
+        }
+        self.found = found;
+        fits && self.settle(measured, from, most)
+    }
+
+    fn add(&mut self, at: Place, index: usize, is_split: bool) {
+        self.members.insert(index as u32, Member { at, is_split, number: u32::MAX });
+        self.fresh[usize::from(is_split)].push(index as u32);
+    }
+
+    /// Adds a diamond that may split and is not there yet.
+    fn add_if_ready(&mut self, measured: &Measured, from: &Viewpoint, at: Option<Place>) {
+        let Some((at, index)) = at.and_then(|at| Some((at, measured.lattice.index(at)?))) else { return };
+        let is_new = !self.splits.contains(index) && !self.members.contains_key(&(index as u32));
+        if is_new && from.reach.matters(measured.error(index)) && self.splits.is_ready(measured, at) {
+            self.add(at, index, false);
+        }
+    }
+
+    fn remove(&mut self, index: usize) {
+        if self.members.remove(&(index as u32)).is_some() {
+            self.watch.left(index as u32, &mut self.tickets);
+        }
+    }
+
+    /// Looks again at those whose tickets are still good.
+    fn redeem(&mut self) {
+        for ticket in self.tickets.drain(..) {
+            if let Some(member) = self.members.get_mut(&ticket.index).filter(|m| m.number == ticket.number) {
+                member.number = u32::MAX;
+                self.fresh[usize::from(member.is_split)].push(ticket.index);
+            }
+        }
+    }
+
+    /// Looks at members until none is on the wrong side of its sphere.
+    fn settle(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+        // What may merge comes last: it may be needed by then.
+        while let Some(index) = self.fresh[0].pop().or_else(|| self.fresh[1].pop()) {
+            let Some(&Member { at, is_split, number }) = self.members.get(&index) else { continue };
+            if number != u32::MAX {
+                continue;
+            }
+            self.visited += 1;
+            let known = measured.known(at, index as usize);
+            let slack = from.slack(&known, is_split);
+            match (slack > 0.0, is_split) {
+                (true, _) => self.look_after(measured, from, &known, is_split, slack),
+                (false, false) => self.split(measured, from, at, index as usize),
+                (false, true) => self.merge(measured, from, at, index as usize),
+            }
+            self.redeem();
+            if self.splits.count() > most {
+                self.last = None;
+                return false;
+            }
+        }
+        true
+    }
+
+    fn look_after(&mut self, measured: &Measured, from: &Viewpoint, known: &Known, is_split: bool, slack: f64) {
+        let ticket = Ticket { index: known.index as u32, number: self.next_number };
+        self.next_number = (self.next_number + 1) % u32::MAX;
+        self.members.get_mut(&ticket.index).expect("a member").number = ticket.number;
+        if slack.is_finite() {
+            let Self { splits, members, visited, .. } = self;
+            let mut front = Front { measured, from, splits, members, visited };
+            self.watch.place(&mut front, ticket, known, is_split, slack);
+        }
+    }
+
+    fn split(&mut self, measured: &Measured, from: &Viewpoint, at: Place, index: usize) {
+        self.remove(index);
+        self.splits.insert(index);
+        self.add(at, index, true);
+        measured.lattice.parents(at).for_each(|(_, parent)| self.remove(parent));
+        measured.lattice.children(at).for_each(|(at, _)| self.add_if_ready(measured, from, Some(at)));
+    }
+
+    fn merge(&mut self, measured: &Measured, from: &Viewpoint, at: Place, index: usize) {
+        self.remove(index);
+        self.splits.remove(index);
+        measured.lattice.children(at).for_each(|(_, child)| self.remove(child));
+        self.add_if_ready(measured, from, Some(at));
+        for (at, parent) in measured.lattice.parents(at) {
+            if !self.splits.is_needed(measured, at) && !self.members.contains_key(&(parent as u32)) {
+                self.add(at, parent, true);
+            }
+        }
+    }
+}

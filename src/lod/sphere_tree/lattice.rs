@@ -1,0 +1,148 @@
+//! The binary triangle tree over a field, as its diamonds: where they are, and which ones split first.
+//!
+//! Two wedges that share a hypotenuse split together, so that the mesh conforms: they make a *diamond*, known by the
+//! middle of that hypotenuse, a vertex of the lattice. Each vertex but the root square's corners is the middle of one
+//! diamond. Where the lowest set bit of both coordinates is the same it is the middle of a cell, whose diagonal turns
+//! with the cell's parity as everywhere in this crate; otherwise the middle of a cell's side. A diamond can split when
+//! its *parents* have, those whose middles are its wedges' apexes; its *children* are in the middles of its four sides.
+//!
+//! The root square is as large as the field's longer side or larger. Vertices beyond the field collapse onto its edge:
+//! hypotenuses are lines of the lattice or diagonals, and so no triangle turns over by that. Diamonds that do not reach
+//! into the field are left out.
+
+/// A vertex of the lattice, finest samples from the field's first one on; in the root square, maybe beyond the field.
+pub type Place = [i32; 2];
+
+/// Two wedges that share a hypotenuse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Diamond {
+    /// Ends of the hypotenuse.
+    pub ends: [Place; 2],
+    /// Where the wedges have their right angles; one may lie outside the root square.
+    pub apexes: [Place; 2],
+}
+
+impl Diamond {
+    /// The one with this middle, which must not be the origin.
+    pub fn around([x, z]: Place) -> Self {
+        let half = half_length([x, z]);
+        let to = |dx: i32, dz: i32| [x + dx * half, z + dz * half];
+        let (rising, falling) = ([to(-1, -1), to(1, 1)], [to(1, -1), to(-1, 1)]);
+        let (along_x, along_z) = ([to(-1, 0), to(1, 0)], [to(0, -1), to(0, 1)]);
+        let [ends, apexes] = match (x & half != 0, z & half != 0) {
+            (true, true) if ((x ^ z) & (half << 1)) == 0 => [rising, falling],
+            (true, true) => [falling, rising],
+            (true, false) => [along_x, along_z],
+            _ => [along_z, along_x],
+        };
+        Self { ends, apexes }
+    }
+}
+
+/// Half the length of a diamond along the axes, samples: the lowest set bit of its middle's coordinates.
+fn half_length([x, z]: Place) -> i32 {
+    let both = x | z;
+    both & both.wrapping_neg()
+}
+
+/// The diamonds over a field.
+#[derive(Clone, Debug)]
+pub struct Lattice {
+    last: Place,
+    /// log2 of the root square's side.
+    depth: u32,
+    /// By the exponent of the half length: places along the axes, and the index of the first.
+    levels: Vec<([i32; 2], usize)>,
+    len: usize,
+}
+
+impl Lattice {
+    /// Over a field whose last sample is this one.
+    pub fn new(last: Place) -> Self {
+        let depth = (last[0].max(last[1]) as u32).next_power_of_two().ilog2();
+        let (mut levels, mut len) = (Vec::new(), 0);
+        for level in 0..depth {
+            // What begins beyond the field does not reach into it.
+            let count = last.map(|n| ((n - 1) >> level) + 2);
+            levels.push((count, len));
+            len += count[0] as usize * count[1] as usize;
+        }
+        Self { last, depth, levels, len }
+    }
+
+    /// Side of the root square, samples.
+    pub fn side(&self) -> i32 {
+        1 << self.depth
+    }
+
+    /// The number of levels of cells' middles.
+    pub fn levels(&self) -> u32 {
+        self.depth
+    }
+
+    /// Indices are below this.
+    pub fn size(&self) -> usize {
+        self.len
+    }
+
+    /// The middle of the root square, where it has one.
+    pub fn root(&self) -> Option<Place> {
+        (self.depth > 0).then(|| [self.side() / 2; 2])
+    }
+
+    /// Places along the axes of the level with this exponent of half a diamond's length.
+    pub fn count(&self, level: u32) -> [i32; 2] {
+        self.levels[level as usize].0
+    }
+
+    /// The index of the diamond with this middle; `None` if there is none.
+    #[inline]
+    pub fn index(&self, [x, z]: Place) -> Option<usize> {
+        let level = (x | z).trailing_zeros();
+        let &([x_count, z_count], first) = self.levels.get(level as usize)?;
+        let [i, j] = [x >> level, z >> level];
+        ((0..x_count).contains(&i) && (0..z_count).contains(&j))
+            .then(|| first + j as usize * x_count as usize + i as usize)
+    }
+
+    /// The diamonds that must have split before this one can.
+    #[inline]
+    pub fn parents(&self, middle: Place) -> impl Iterator<Item = (Place, usize)> {
+        Diamond::around(middle).apexes.into_iter().filter_map(|at| Some((at, self.index(at)?)))
+    }
+
+    /// The diamonds that need this one to have split.
+    #[inline]
+    pub fn children(&self, middle: Place) -> impl Iterator<Item = (Place, usize)> {
+        let [x, z] = middle;
+        let half = half_length(middle);
+        let is_cell = x & half != 0 && z & half != 0;
+        let quarter = half >> 1;
+        // A cell's children are in the middles of its sides, a side's in the middles of the cells around its ends.
+        let at = if is_cell {
+            [[x - half, z], [x + half, z], [x, z - half], [x, z + half]]
+        } else {
+            [[-1, -1], [1, -1], [-1, 1], [1, 1]].map(|[dx, dz]| [x + dx * quarter, z + dz * quarter])
+        };
+        let has_children = is_cell || quarter > 0;
+        at.into_iter().filter(move |_| has_children).filter_map(|at| Some((at, self.index(at)?)))
+    }
+
+    /// Where a vertex is drawn: on the field.
+    #[inline]
+    pub fn on_field(&self, [x, z]: Place) -> Place {
+        [x.min(self.last[0]), z.min(self.last[1])]
+    }
+
+    /// Whether a vertex lies in the root square.
+    pub fn contains(&self, [x, z]: Place) -> bool {
+        (0..=self.side()).contains(&x) && (0..=self.side()).contains(&z)
+    }
+
+    /// Whether a diamond has a corner beyond the field.
+    pub fn sticks_out(&self, middle: Place) -> bool {
+        let Diamond { ends, apexes } = Diamond::around(middle);
+        let mut corners = ends.into_iter().chain(apexes).filter(|&at| self.contains(at));
+        corners.any(|at| self.on_field(at) != at)
+    }
+}

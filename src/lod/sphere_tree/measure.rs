@@ -1,0 +1,227 @@
+//! What is known of the diamonds before any view: how far unsplit ones are from the samples, and how large the ball is
+//! that holds all that they cover.
+//!
+//! Both are nested: a diamond's error is at least its children's, and its ball holds theirs. So a sphere about the same
+//! middle with a radius that grows with the error and is the ball's plus that holds the children's spheres, for every
+//! view: no diamond splits before its parents. (P. Lindstrom and V. Pascucci, "Visualization of Large Terrains Made
+//! Easy", 2001, §4, nest the spheres of vertices in the same way.)
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::lattice::{Diamond, Lattice, Place};
+use crate::height::Field;
+use crate::height::bounds::ROUNDING;
+use crate::height::surface::{self, Corner};
+
+/// What rounding may take from a ball, relative: far more than that of a distance in f64.
+const SPARE: f64 = 1e-6;
+
+/// A field with its diamonds measured.
+pub struct Measured {
+    /// Heights.
+    pub field: Arc<Field>,
+    /// Diamonds.
+    pub lattice: Lattice,
+    /// By index, metres: the largest distance of an unsplit diamond's triangles from the samples.
+    errors: Vec<f32>,
+    /// By index, metres: the ball about the middle.
+    balls: Vec<f32>,
+    /// By how much a sphere is larger for vertices to fade in.
+    band: f32,
+    /// What rounding may add to the error of vertices on their way, metres.
+    rounding: f32,
+}
+
+/// A diamond with what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// Its middle on the lattice.
+    pub at: Place,
+    /// Its index.
+    pub index: usize,
+    /// Its middle from the field's first sample on, at its height, metres.
+    pub centre: DVec3,
+    /// Metres.
+    pub error: f32,
+    /// Metres.
+    pub ball: f32,
+}
+
+impl Measured {
+    /// Measures all diamonds, level by level in parallel. Where vertices fade in over a `band` above 1 times a sphere's
+    /// radius and one does not, because its diamond sticks out of the field, its parents' spheres are larger by that:
+    /// what they hang on is there in full.
+    pub fn new(field: Arc<Field>, band: f32) -> Self {
+        let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
+        let range = field.statistics();
+        let rounding = if band > 1.0 { range.min.abs().max(range.max.abs()) * ROUNDING } else { 0.0 };
+        let nothing = || vec![0.0; lattice.size()];
+        let mut measured = Self { errors: nothing(), balls: nothing(), field, lattice, band, rounding };
+        for level in 0..measured.lattice.levels() {
+            // Sides before cells: a cell's children are in its sides.
+            measured.measure_level(level, |i, j| (i ^ j) & 1 == 1);
+            measured.measure_level(level, |i, j| i & j & 1 == 1);
+        }
+        measured
+    }
+
+    fn measure_level(&mut self, level: u32, is_meant: impl Fn(i32, i32) -> bool + Sync) {
+        let [x_count, z_count] = self.lattice.count(level);
+        let of_row = |j: i32| {
+            let row = (0..x_count).filter(|&i| is_meant(i, j));
+            row.map(|i| self.measure([i << level, j << level])).collect::<Vec<_>>()
+        };
+        let rows: Vec<_> = (0..z_count).into_par_iter().map(of_row).collect();
+        for (index, error, ball) in rows.into_iter().flatten() {
+            self.errors[index] = error;
+            self.balls[index] = ball;
+        }
+    }
+
+    /// Index, error and ball of a diamond whose children are measured.
+    fn measure(&self, middle: Place) -> (usize, f32, f32) {
+        let index = self.lattice.index(middle).expect("a place of the level");
+        let Diamond { ends, apexes } = Diamond::around(middle);
+        let centre = self.centre(middle);
+        let (mut error, mut ball) = (0.0f32, 0.0f64);
+        for apex in apexes.into_iter().filter(|&apex| self.lattice.contains(apex)) {
+            error = error.max(self.deviation([apex, ends[0], ends[1]]));
+            ball = [apex, ends[0], ends[1]].map(|at| self.centre(at).distance(centre)).into_iter().fold(ball, f64::max);
+        }
+        if error > 0.0 {
+            error += self.rounding;
+        }
+        let sticks_out = self.lattice.sticks_out(middle);
+        for (at, child) in self.lattice.children(middle) {
+            let further = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
+            error = error.max(self.errors[child] * further);
+            ball = ball.max(self.centre(at).distance(centre) + f64::from(self.balls[child] * further));
+        }
+        (index, error, ((ball * (1.0 + SPARE)) as f32).next_up())
+    }
+
+    /// How far a triangle is from the samples in it, metres; 0 if it collapses.
+    fn deviation(&self, corners: [Place; 3]) -> f32 {
+        let [a, b, c] = corners.map(|at| {
+            let [x, z] = self.lattice.on_field(at);
+            Corner { x, z, y: self.field.height(x as u32, z as u32) }
+        });
+        match surface::doubled_area(&[a, b, c]) {
+            0 => 0.0,
+            area if area > 0 => surface::deviation(&self.field, &[a, b, c]),
+            _ => surface::deviation(&self.field, &[a, c, b]),
+        }
+    }
+
+    /// Height of a vertex, metres.
+    #[inline]
+    pub fn height(&self, at: Place) -> f32 {
+        let [x, z] = self.lattice.on_field(at);
+        self.field.height(x as u32, z as u32)
+    }
+
+    /// A vertex from the field's first sample on, metres.
+    #[inline]
+    fn centre(&self, at: Place) -> DVec3 {
+        let [x, z] = self.lattice.on_field(at);
+        let [dx, dz] = self.field.spacing;
+        DVec3::new(f64::from(x) * dx, f64::from(self.field.height(x as u32, z as u32)), f64::from(z) * dz)
+    }
+
+    /// A world position from the field's first sample on, metres.
+    pub fn relative(&self, point: DVec3) -> DVec3 {
+        point - DVec3::new(self.field.origin[0], 0.0, self.field.origin[1])
+    }
+
+    /// What is known of a diamond.
+    #[inline]
+    pub fn known(&self, at: Place, index: usize) -> Known {
+        Known { at, index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
+    }
+
+    /// The largest error of an unsplit diamond, metres.
+    #[inline]
+    pub fn error(&self, index: usize) -> f32 {
+        self.errors[index]
+    }
+
+    /// Bytes of errors and balls.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.errors.as_slice()) + size_of_val(self.balls.as_slice())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+
+    fn field(size: [u32; 2]) -> Arc<Field> {
+        let height = |k: u32| ((k * 7919) % 1009) as f32 * 0.1 + (k % size[0]) as f32;
+        let heights = (0..size[0] * size[1]).map(height).collect();
+        Arc::new(Field::new(Samples::F32(heights), size, [2.0, 3.0], Holes::none((size[0] * size[1]) as usize)))
+    }
+
+    /// Calls `visit` for every diamond.
+    fn each(measured: &Measured, mut visit: impl FnMut(Known)) {
+        for level in 0..measured.lattice.levels() {
+            let [x_count, z_count] = measured.lattice.count(level);
+            for (i, j) in (0..z_count).flat_map(|j| (0..x_count).map(move |i| (i, j))).filter(|(i, j)| (i | j) & 1 == 1)
+            {
+                let at = [i << level, j << level];
+                visit(measured.known(at, measured.lattice.index(at).expect("a diamond")));
+            }
+        }
+    }
+
+    #[test]
+    fn errors_and_balls_are_nested_whatever_the_size() {
+        for (size, band) in [([33, 33], 1.0), ([33, 33], 1.3), ([37, 21], 1.0), ([37, 21], 1.3), ([2, 30], 1.3)] {
+            let measured = Measured::new(field(size), band);
+            let mut children = 0;
+            each(&measured, |parent| {
+                let out = |at| measured.lattice.sticks_out(at);
+                for (at, index) in measured.lattice.children(parent.at) {
+                    let child = measured.known(at, index);
+                    let further = if !out(parent.at) && out(at) { band } else { 1.0 };
+                    let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(further);
+                    assert!(reach <= f64::from(parent.ball) && child.error * further <= parent.error, "{parent:?}");
+                    assert!(measured.lattice.parents(at).any(|(_, index)| index == parent.index), "{child:?}");
+                    children += 1;
+                }
+            });
+            // Each has two parents, but for those at the border and the root.
+            assert!(children as u32 > size[0] * size[1]);
+        }
+    }
+
+    #[test]
+    fn a_ball_holds_every_sample_that_its_wedges_cover() {
+        let measured = Measured::new(field([37, 21]), 1.0);
+        let mut samples = 0;
+        each(&measured, |known| {
+            let Diamond { ends, apexes } = Diamond::around(known.at);
+            for apex in apexes.into_iter().filter(|&at| measured.lattice.contains(at)) {
+                let mut corners = [apex, ends[0], ends[1]].map(|at| {
+                    let [x, z] = measured.lattice.on_field(at);
+                    Corner { x, z, y: measured.height(at) }
+                });
+                if surface::doubled_area(&corners) < 0 {
+                    corners.swap(1, 2);
+                }
+                if surface::doubled_area(&corners) > 0 {
+                    surface::visit_samples(&corners, |x, z, y| {
+                        let sample = measured.centre([x as i32, z as i32]);
+                        assert!(sample.distance(known.centre) <= f64::from(known.ball), "{known:?}");
+                        assert!((y - sample.y).abs() <= f64::from(known.error), "{known:?}");
+                        samples += 1;
+                    });
+                }
+            }
+        });
+        assert!(samples > 5000, "{samples} samples in wedges");
+    }
+}

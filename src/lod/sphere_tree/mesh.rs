@@ -1,0 +1,212 @@
+//! From split diamonds to triangles: down the binary tree of wedges, those in sight.
+//!
+//! Vertices that fade in go from the middle of their hypotenuse *as it is drawn* to their height over it:
+//! drawn(m) = mid(drawn(a), drawn(c)) + (1 − w)·(h(m) − mid(h(a), h(c))). A weight w is at least the weights of all that
+//! the vertex hangs on, so that the surface is the mean over t in 0..1 of the meshes of the vertices with w ≤ t. Each of
+//! these is conforming and holds all diamonds that must have split, so that each keeps the tolerance, and so does their
+//! mean. Where a vertex comes or goes, w is 1 and the surface the same with and without it.
+
+use rayon::prelude::*;
+
+use super::blocks::Blocks;
+use super::lattice::{Lattice, Place};
+use super::measure::Measured;
+use super::reach::Viewpoint;
+use super::splits::Splits;
+use crate::draw::{Draw, DrawList, ExplicitVertex, Instance, Source, Topology};
+
+/// A corner of a wedge on its way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Corner {
+    at: Place,
+    /// Of the sample, metres.
+    height: f64,
+    /// Middle of the hypotenuse as drawn, metres.
+    target: f64,
+    /// Over that at the end of its way, metres.
+    over: f64,
+    weight: f32,
+}
+
+impl Corner {
+    /// Height at which it is drawn, metres.
+    fn drawn(&self) -> f64 {
+        self.target + (1.0 - f64::from(self.weight)) * self.over
+    }
+
+    fn vertex(&self, lattice: &Lattice) -> ExplicitVertex {
+        let height = if self.over + self.target == self.height { self.height } else { self.target + self.over };
+        ExplicitVertex {
+            position: lattice.on_field(self.at),
+            height: height as f32,
+            target: self.target as f32,
+            morph: self.weight,
+            ..ExplicitVertex::default()
+        }
+    }
+}
+
+/// A wedge: the corner with the right angle first, counter-clockwise seen from above.
+type Wedge = [Corner; 3];
+
+/// The triangles of one draw.
+#[derive(Default)]
+struct Piece {
+    vertices: Vec<ExplicitVertex>,
+    indices: Vec<u32>,
+}
+
+/// A viewpoint's mesh to be made.
+pub struct Mesh<'a> {
+    /// Heights and diamonds.
+    pub measured: &'a Measured,
+    /// What has split.
+    pub splits: &'a Splits,
+    /// What is in sight.
+    pub blocks: &'a Blocks,
+    /// Where vertices fade in.
+    pub from: &'a Viewpoint,
+}
+
+impl Mesh<'_> {
+    /// Fills an empty list: a draw for the wedges larger than a block, and one for each block in sight.
+    pub fn fill(&self, list: &mut DrawList) {
+        let (mut large, mut small) = (Vec::new(), Vec::new());
+        for wedge in self.roots() {
+            self.descend(&wedge, &mut large, &mut small);
+        }
+        small.sort_by_key(|(block, _)| *block);
+        let blocks: Vec<_> = small.chunk_by(|a, b| a.0 == b.0).collect();
+        let of_block = |wedges: &&[(usize, Wedge)]| self.piece(wedges.iter().map(|(_, wedge)| wedge));
+        let pieces: Vec<Piece> = blocks.par_iter().map(of_block).collect();
+        push(list, self.loose(&large));
+        pieces.into_iter().for_each(|piece| push(list, piece));
+    }
+
+    fn roots(&self) -> [Wedge; 2] {
+        let side = self.measured.lattice.side();
+        let [a, b, c, d] = [[0, 0], [side, 0], [0, side], [side, side]].map(|at| self.sample(at));
+        // Seen from above with z to the south: the diagonal goes from the first corner to the last.
+        [[c, d, a], [b, a, d]]
+    }
+
+    fn sample(&self, at: Place) -> Corner {
+        let height = f64::from(self.measured.height(at));
+        Corner { at, height, target: height, over: 0.0, weight: 0.0 }
+    }
+
+    /// The middle of a wedge's hypotenuse.
+    fn middle(&self, a: &Corner, c: &Corner, at: Place, index: usize) -> Corner {
+        let mut middle = self.sample(at);
+        if self.from.band > 1.0 {
+            let fades = !self.measured.lattice.sticks_out(at);
+            middle.target = (a.drawn() + c.drawn()) / 2.0;
+            middle.over = middle.height - (a.height + c.height) / 2.0;
+            middle.weight = if fades { self.from.weight(&self.measured.known(at, index)) as f32 } else { 0.0 };
+        }
+        middle
+    }
+
+    /// The two halves of a wedge, if it has split.
+    fn halves(&self, [apex, left, right]: &Wedge) -> Option<[Wedge; 2]> {
+        let sum = [0, 1].map(|k| left.at[k] + right.at[k]);
+        if (sum[0] | sum[1]) & 1 == 1 {
+            // A cell's half.
+            return None;
+        }
+        let at = sum.map(|n| n / 2);
+        let index = self.measured.lattice.index(at).filter(|&index| self.splits.contains(index))?;
+        let middle = self.middle(left, right, at, index);
+        Some([[middle, *apex, *left], [middle, *right, *apex]])
+    }
+
+    /// Sorts wedges in sight into those larger than a block and those within one.
+    fn descend(&self, wedge: &Wedge, large: &mut Vec<Wedge>, small: &mut Vec<(usize, Wedge)>) {
+        if self.is_within_a_block(&wedge.map(|corner| corner.at)) {
+            small.extend(self.blocks.seen(wedge.map(|corner| corner.at)).map(|block| (block, *wedge)));
+        } else if let Some(halves) = self.halves(wedge) {
+            halves.iter().for_each(|half| self.descend(half, large, small));
+        } else if self.covers_a_seen_block(wedge.map(|corner| corner.at)) {
+            large.push(*wedge);
+        }
+    }
+
+    /// Whether a wedge is half a block or smaller.
+    fn is_within_a_block(&self, [apex, left, right]: &[Place; 3]) -> bool {
+        let length = |k: usize| [apex, left, right].map(|at| at[k]).into_iter();
+        (0..2).all(|k| length(k).max().unwrap_or(0) - length(k).min().unwrap_or(0) <= self.blocks.side)
+    }
+
+    fn covers_a_seen_block(&self, wedge: [Place; 3]) -> bool {
+        if self.is_within_a_block(&wedge) {
+            return self.blocks.seen(wedge).is_some();
+        }
+        let [apex, left, right] = wedge;
+        let middle = [0, 1].map(|k| (left[k] + right[k]) / 2);
+        [[middle, apex, left], [middle, right, apex]].into_iter().any(|half| self.covers_a_seen_block(half))
+    }
+
+    /// The triangles under wedges of one block.
+    fn piece<'w>(&self, wedges: impl Iterator<Item = &'w Wedge>) -> Piece {
+        let mut leaves = Vec::new();
+        for wedge in wedges {
+            let mut open = vec![*wedge];
+            while let Some(wedge) = open.pop() {
+                match self.halves(&wedge) {
+                    Some([first, second]) => open.extend([second, first]),
+                    None => leaves.push(wedge),
+                }
+            }
+        }
+        let row = self.blocks.side as usize + 1;
+        let mut table = vec![u32::MAX; row * row];
+        let origin = [0, 1].map(|k| leaves.iter().flatten().map(|corner| corner.at[k]).min().unwrap_or(0));
+        let mut piece = Piece::default();
+        for wedge in leaves.iter().filter(|wedge| self.has_area(wedge)) {
+            for corner in wedge {
+                let [x, z] = [0, 1].map(|k| (corner.at[k] - origin[k]) as usize);
+                let place = &mut table[z * row + x];
+                if *place == u32::MAX {
+                    *place = piece.vertices.len() as u32;
+                    piece.vertices.push(corner.vertex(&self.measured.lattice));
+                }
+                piece.indices.push(*place);
+            }
+        }
+        piece
+    }
+
+    /// Triangles that share no vertices.
+    fn loose(&self, wedges: &[Wedge]) -> Piece {
+        let mut piece = Piece::default();
+        for corner in wedges.iter().filter(|wedge| self.has_area(wedge)).flatten() {
+            piece.indices.push(piece.vertices.len() as u32);
+            piece.vertices.push(corner.vertex(&self.measured.lattice));
+        }
+        piece
+    }
+
+    /// Whether a wedge does not collapse onto the field's edge.
+    fn has_area(&self, wedge: &Wedge) -> bool {
+        let [[ax, az], [bx, bz], [cx, cz]] = wedge.map(|corner| self.measured.lattice.on_field(corner.at));
+        i64::from(bz - az) * i64::from(cx - ax) != i64::from(bx - ax) * i64::from(cz - az)
+    }
+}
+
+fn push(list: &mut DrawList, piece: Piece) {
+    if piece.indices.is_empty() {
+        return;
+    }
+    let (first_vertex, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
+    let batch = list.instances.len() as u32;
+    list.streamed.vertices.extend(piece.vertices);
+    list.streamed.indices.extend(piece.indices);
+    list.instances.push(Instance { batch, ..Instance::default() });
+    list.draws.push(Draw {
+        source: Source::Streamed,
+        topology: Topology::Triangles,
+        indices: first..list.streamed.indices.len() as u32,
+        instances: batch..batch + 1,
+        first_vertex,
+    });
+}

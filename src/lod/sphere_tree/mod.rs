@@ -1,0 +1,199 @@
+//! Spheres: a binary triangle tree whose wedges split where the viewpoint is inside their spheres.
+//!
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II. A wedge that has an error on the screen
+//! above the tolerance when the eye is near enough has a sphere around it: inside it splits, outside it merges. Two
+//! wedges that share a hypotenuse split together, so one sphere serves both, about the middle of that hypotenuse
+//! ([`lattice`]). What has split is thus a function of the eye's place alone. Which spheres it may have crossed is found
+//! in four ways, with the same triangles: made-up spheres about the viewpoint that group those it cannot have crossed
+//! ([`shells`]); the same for those that lie behind no other one, as the lecture has it, which costs more than it saves
+//! ([`covers`]); ROAM's two queues ([`roam`]); and every sphere anew ([`splits`]).
+//!
+//! Where this differs from the lecture, and why:
+//! - the lecture's functions are its application's; here a sphere's radius follows from an error measured at every
+//!   sample ([`measure`]) and the view's tolerance, `certified` or as published elsewhere ([`reach`]);
+//! - spheres are nested over both parents of a diamond, not only in the tree. So no split is ever forced by a neighbour:
+//!   it is inside its own sphere already, and no order of crossings matters;
+//! - any size of field: the root square may be larger, and its vertices beyond the field fall onto its edge;
+//! - `morph=on` lets vertices fade in over a band around their spheres ([`mesh`]), but for those of diamonds that stick
+//!   out of the field;
+//! - triangles out of sight are left out, by blocks.
+//!
+//! Laws kept: watertight, covered once, error within tolerance, no state between views (`hold=off`).
+
+pub mod blocks;
+pub mod covers;
+pub mod front;
+pub mod lattice;
+pub mod measure;
+pub mod mesh;
+pub mod reach;
+pub mod roam;
+pub mod shells;
+pub mod splits;
+
+use std::sync::Arc;
+
+use self::blocks::Blocks;
+use self::covers::Covers;
+use self::front::Follower;
+use self::measure::Measured;
+use self::mesh::Mesh;
+use self::reach::{Reach, Viewpoint};
+use self::roam::Queues;
+use self::shells::Shells;
+use self::splits::{Found, Splits};
+use super::{Entry, Setting, Settings, Technique, Values};
+use crate::draw::{DrawList, Geometry, Limits};
+use crate::height::Field;
+use crate::view::View;
+
+/// Vertices fade in over so many times a sphere's radius: a wider band draws more, a narrower one is seen.
+const BAND: f32 = 1.3;
+/// Diamonds that have split stay so up to this many times a sphere's radius, if they are held.
+const HOLD: f64 = 1.1;
+/// The most diamonds that split, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
+const MOST_SPLITS: usize = 1 << 20;
+/// What the tolerance is multiplied by until a frame fits.
+const WIDENING: f64 = 1.5;
+
+/// The row of the table.
+pub const ENTRY: Entry = Entry {
+    name: "sphere-tree",
+    about: "binary triangle tree: a wedge splits where the eye is inside its sphere",
+    paper: "Blow 2000",
+    variants: &[],
+    settings: &[
+        Setting {
+            key: "criterion",
+            values: Values::Words(&["spheres", "covers", "roam", "plain"]),
+            default: "spheres",
+            about: "how crossed spheres are found: by made-up ones, behind others, by two queues, or among all; same triangles",
+        },
+        Setting {
+            key: "morph",
+            values: Values::Words(&["off", "on"]),
+            default: "off",
+            about: "whether vertices come at once or fade in around their spheres",
+        },
+        Setting {
+            key: "hold",
+            values: Values::Words(&["off", "on"]),
+            default: "off",
+            about: "whether a wedge merges a little further away than it splits",
+        },
+    ],
+    build: |field, settings| Box::new(SphereTree::new(field, settings)),
+};
+
+/// How the split diamonds are found.
+enum Criterion {
+    Spheres(Follower<Shells>),
+    Covers(Follower<Covers>),
+    Roam(Follower<Queues>),
+    Plain { splits: Splits, found: Found },
+}
+
+struct SphereTree {
+    measured: Measured,
+    blocks: Blocks,
+    criterion: Criterion,
+    band: f64,
+    hold: f64,
+    limits: Limits,
+    nothing: Geometry,
+}
+
+impl Criterion {
+    fn follow(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+        match self {
+            Criterion::Spheres(follower) => follower.follow(measured, from, most),
+            Criterion::Covers(follower) => follower.follow(measured, from, most),
+            Criterion::Roam(follower) => follower.follow(measured, from, most),
+            Criterion::Plain { splits, found } => splits.refill(measured, from, found, most),
+        }
+    }
+
+    fn splits(&self) -> &Splits {
+        match self {
+            Criterion::Spheres(follower) => follower.splits(),
+            Criterion::Covers(follower) => follower.splits(),
+            Criterion::Roam(follower) => follower.splits(),
+            Criterion::Plain { splits, .. } => splits,
+        }
+    }
+
+    fn visited(&self) -> usize {
+        match self {
+            Criterion::Spheres(follower) => follower.visited(),
+            Criterion::Covers(follower) => follower.visited(),
+            Criterion::Roam(follower) => follower.visited(),
+            Criterion::Plain { found, .. } => found.visited,
+        }
+    }
+}
+
+impl SphereTree {
+    fn new(field: Arc<Field>, settings: &Settings) -> Self {
+        let band = if settings.word("morph") == "on" { BAND } else { 1.0 };
+        let measured = Measured::new(field, band);
+        let blocks = Blocks::new(&measured.field, &measured.lattice);
+        let criterion = match settings.word("criterion") {
+            "spheres" => Criterion::Spheres(Follower::new(&measured)),
+            "covers" => Criterion::Covers(Follower::new(&measured)),
+            "roam" => Criterion::Roam(Follower::new(&measured)),
+            _ => Criterion::Plain { splits: Splits::none(&measured), found: Found::default() },
+        };
+        let hold = if settings.word("hold") == "on" { HOLD } else { 1.0 };
+        let limits = limits(&measured, &blocks);
+        Self { measured, blocks, criterion, band: f64::from(band), hold, limits, nothing: Geometry::default() }
+    }
+}
+
+/// A split makes two triangles more. A block's pieces have two vertices more than triangles at most, and larger wedges
+/// three each.
+fn limits(measured: &Measured, blocks: &Blocks) -> Limits {
+    let [w, h] = measured.field.size().map(|n| n as usize);
+    let triangles = (2 * (w - 1) * (h - 1)).min(2 * MOST_SPLITS + 2);
+    let draws = blocks.number() + 1;
+    Limits { draws, instances: draws, vertices: triangles + 8 * draws, indices: 3 * triangles, upload_bytes: 0 }
+}
+
+impl Technique for SphereTree {
+    fn resident(&self) -> &Geometry {
+        &self.nothing
+    }
+
+    fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        let mut wider = *view;
+        let from = loop {
+            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&wider));
+            let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
+            if self.criterion.follow(&self.measured, &from, MOST_SPLITS) {
+                break from;
+            }
+            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+        };
+        if wider.tolerance.px != view.tolerance.px {
+            list.widening = wider.tolerance.px / view.tolerance.px;
+        }
+        self.blocks.look(view);
+        let Self { measured, blocks, criterion, .. } = self;
+        Mesh { measured, splits: criterion.splits(), blocks, from: &from }.fill(list);
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+
+    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+        vec![
+            ("wedges visited for the last view", 2.0 * self.criterion.visited() as f64, ""),
+            ("wedges split in the last view", 2.0 * self.criterion.splits().count() as f64, ""),
+            ("bytes of errors and balls", self.measured.bytes() as f64, "B"),
+        ]
+    }
+}

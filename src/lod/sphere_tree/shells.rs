@@ -1,0 +1,97 @@
+//! Made-up spheres about places where the viewpoint was, each with the members of the front that lie beyond it.
+//!
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II: where there are many surfaces, made-up
+//! ones that belong to no wedge group them, and none of a group is looked at before the viewpoint crosses that. Here all
+//! members that were looked at in one frame lie around the place of the viewpoint in that frame, as shells one in the
+//! other: by how far the viewpoint may go from there before it can have crossed each. While it stays inside the
+//! innermost shell of a place, whichever way it goes there, none of them is looked at; and that shell itself is only
+//! when the way gone could have led out of it.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use super::front::{Front, Ticket, Watch};
+use super::measure::Known;
+use super::reach::Viewpoint;
+
+/// The shells about one place.
+#[derive(Default)]
+struct Nest {
+    centre: DVec3,
+    /// Radius, metres, as the bits of a positive float, and what it is for; the innermost last.
+    shells: Vec<(u64, Ticket)>,
+}
+
+impl Nest {
+    /// How far the innermost shell is from a place inside it, metres.
+    fn slack(&self, eye: DVec3) -> Option<f64> {
+        let &(radius, _) = self.shells.last()?;
+        Some(f64::from_bits(radius) - self.centre.distance(eye) * (1.0 + 1e-9))
+    }
+}
+
+/// All places with their shells.
+#[derive(Default)]
+pub struct Shells {
+    /// About the viewpoint, not sorted yet.
+    current: Nest,
+    nests: Vec<Nest>,
+    /// Numbers of nests without shells.
+    empty: Vec<u32>,
+    /// Way of the viewpoint, metres, upon which a nest's innermost shell may be crossed, as the bits of a float.
+    queue: BinaryHeap<Reverse<(u64, u32)>>,
+    eye: DVec3,
+    /// Way of the viewpoint so far, metres.
+    way: f64,
+}
+
+impl Shells {
+    /// Sorts the shells about the last place of the viewpoint.
+    fn close_current(&mut self) {
+        if self.current.shells.is_empty() {
+            return;
+        }
+        self.current.shells.sort_unstable_by_key(|&shell| Reverse(shell));
+        let number = self.empty.pop().unwrap_or_else(|| {
+            self.nests.push(Nest::default());
+            self.nests.len() as u32 - 1
+        });
+        std::mem::swap(&mut self.nests[number as usize], &mut self.current);
+        self.await_innermost(number, self.eye);
+    }
+
+    fn await_innermost(&mut self, number: u32, eye: DVec3) {
+        match self.nests[number as usize].slack(eye) {
+            Some(slack) => self.queue.push(Reverse(((self.way + slack).max(0.0).to_bits(), number))),
+            None => self.empty.push(number),
+        }
+    }
+}
+
+impl Watch for Shells {
+    fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, visited: &mut usize) {
+        self.close_current();
+        self.way += self.eye.distance(from.eye) * (1.0 + 1e-9);
+        self.eye = from.eye;
+        while let Some(&Reverse((_, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.way) {
+            self.queue.pop();
+            *visited += 1;
+            let nest = &mut self.nests[number as usize];
+            while nest.slack(from.eye).is_some_and(|slack| slack <= 0.0) {
+                tickets.extend(nest.shells.pop().map(|(_, ticket)| ticket));
+            }
+            self.await_innermost(number, from.eye);
+        }
+    }
+
+    fn place(&mut self, front: &mut Front, ticket: Ticket, _known: &Known, _is_split: bool, slack: f64) {
+        (self.eye, self.current.centre) = (front.from.eye, front.from.eye);
+        self.current.shells.push((slack.to_bits(), ticket));
+    }
+}

@@ -1,0 +1,104 @@
+//! The diamonds that have split, and the plain way to find them: look at every one again.
+
+use super::lattice::Place;
+use super::measure::Measured;
+use super::reach::Viewpoint;
+
+/// A set of split diamonds: none without its parents.
+#[derive(Clone, Debug, Default)]
+pub struct Splits {
+    /// One bit a diamond, by index.
+    words: Vec<u64>,
+    count: usize,
+}
+
+/// What a pass over all diamonds found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The diamonds that have split: middles and indices, parents first.
+    pub split: Vec<(Place, usize)>,
+    /// Diamonds looked at.
+    pub visited: usize,
+    /// The set before.
+    before: Splits,
+}
+
+impl Splits {
+    /// No split diamond.
+    pub fn none(measured: &Measured) -> Self {
+        Self { words: vec![0; measured.lattice.size().div_ceil(64)], count: 0 }
+    }
+
+    fn clear(&mut self, measured: &Measured) {
+        self.words.clear();
+        self.words.resize(measured.lattice.size().div_ceil(64), 0);
+        self.count = 0;
+    }
+
+    /// Whether a diamond has split, by index.
+    #[inline]
+    pub fn contains(&self, index: usize) -> bool {
+        self.words[index / 64] >> (index % 64) & 1 != 0
+    }
+
+    /// How many have.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Adds one that has not.
+    pub(super) fn insert(&mut self, index: usize) {
+        debug_assert!(!self.contains(index));
+        self.words[index / 64] |= 1 << (index % 64);
+        self.count += 1;
+    }
+
+    /// Removes one.
+    pub(super) fn remove(&mut self, index: usize) {
+        debug_assert!(self.contains(index));
+        self.words[index / 64] &= !(1 << (index % 64));
+        self.count -= 1;
+    }
+
+    /// Whether all parents of a diamond have split.
+    pub fn is_ready(&self, measured: &Measured, at: Place) -> bool {
+        measured.lattice.parents(at).all(|(_, parent)| self.contains(parent))
+    }
+
+    /// Whether a child of a diamond has split.
+    pub fn is_needed(&self, measured: &Measured, at: Place) -> bool {
+        measured.lattice.children(at).any(|(_, child)| self.contains(child))
+    }
+
+    /// Looks at every diamond that could have split, from the root on, and makes this the set for the viewpoint.
+    /// It gives up, and says so, beyond `most` diamonds.
+    pub fn refill(&mut self, measured: &Measured, from: &Viewpoint, found: &mut Found, most: usize) -> bool {
+        std::mem::swap(self, &mut found.before);
+        self.clear(measured);
+        found.split.clear();
+        found.visited = 0;
+        let mut open: Vec<_> =
+            measured.lattice.root().and_then(|at| Some((at, measured.lattice.index(at)?))).into_iter().collect();
+        while let Some((at, index)) = open.pop() {
+            found.visited += 1;
+            let known = measured.known(at, index);
+            let was_split = from.hold > 1.0 && found.before.contains(index);
+            let slack = from.slack(&known, was_split);
+            if (slack > 0.0) != was_split {
+                continue;
+            }
+            if self.count == most {
+                return false;
+            }
+            self.insert(index);
+            found.split.push((at, index));
+            // The last of its parents to split opens a diamond.
+            let children = measured.lattice.children(at);
+            open.extend(
+                children
+                    .filter(|&(at, child)| from.reach.matters(measured.error(child)) && self.is_ready(measured, at)),
+            );
+        }
+        true
+    }
+}

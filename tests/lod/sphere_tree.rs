@@ -1,0 +1,251 @@
+//! Spheres: the same triangles however crossings are found, whatever the way there.
+
+use std::sync::Arc;
+
+use cuesta::draw::DrawList;
+use cuesta::height::synth::{self, Kind};
+use cuesta::height::{Field, Holes, Samples};
+use cuesta::lod::sphere_tree::covers::Covers;
+use cuesta::lod::sphere_tree::front::{Follower, Watch};
+use cuesta::lod::sphere_tree::lattice::Place;
+use cuesta::lod::sphere_tree::measure::{Known, Measured};
+use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
+use cuesta::lod::sphere_tree::roam::Queues;
+use cuesta::lod::sphere_tree::shells::Shells;
+use cuesta::lod::sphere_tree::splits::{Found, Splits};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+
+/// Deterministic random numbers.
+struct Dice(u64);
+
+impl Dice {
+    /// 0..1.
+    fn share(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Anywhere in a cube about 0 of side 2.
+    fn direction(&mut self) -> DVec3 {
+        DVec3::new(self.share(), self.share(), self.share()) * 2.0 - 1.0
+    }
+}
+
+fn land(size: [u32; 2]) -> Arc<Field> {
+    let mut field = synth::synth(Kind::Fractal, size, 3);
+    field.spacing = [10.0, 12.0];
+    Arc::new(field)
+}
+
+/// No two neighbours alike.
+fn noise(size: [u32; 2]) -> Arc<Field> {
+    let mut dice = Dice(9);
+    let heights = (0..size[0] * size[1]).map(|_| 50.0 * dice.share() as f32).collect();
+    Arc::new(Field::new(Samples::F32(heights), size, [3.0, 3.0], Holes::none((size[0] * size[1]) as usize)))
+}
+
+/// Smooth land over 1280 m, of a size that nothing sticks out of.
+fn hills() -> Arc<Field> {
+    let height = |x: f32, z: f32| 40.0 * (x / 9.0).sin() + 30.0 * (z / 7.0).cos() + 2.0 * (1.3 * x + z).sin();
+    let heights = (0..129 * 129).map(|k| height((k % 129) as f32, (k / 129) as f32)).collect();
+    Arc::new(Field::new(Samples::F32(heights), [129, 129], [10.0, 10.0], Holes::none(129 * 129)))
+}
+
+fn view(eye: DVec3, px: f64) -> View {
+    View {
+        eye,
+        world_from_eye: View::turned(30.0, -20.0, 0.0),
+        lens: Lens::Perspective { fov_x: 1.2 },
+        size: [640, 360],
+        near: 0.1,
+        tolerance: Tolerance { px, metric: Metric::Certified },
+        time_s: 0.0,
+    }
+}
+
+fn viewpoint(measured: &Measured, eye: DVec3, px: f64) -> Viewpoint {
+    Viewpoint { eye: measured.relative(eye), reach: Reach::new(&view(eye, px)), band: 1.0, hold: 1.0 }
+}
+
+/// Every diamond.
+fn diamonds(measured: &Measured) -> Vec<Known> {
+    let of_level = |level: u32| {
+        let [x_count, z_count] = measured.lattice.count(level);
+        let places = (0..z_count).flat_map(move |j| (0..x_count).map(move |i| (i, j)));
+        places.filter(|(i, j)| (i | j) & 1 == 1).map(move |(i, j)| [i << level, j << level])
+    };
+    let known = |at: Place| measured.known(at, measured.lattice.index(at).expect("a diamond"));
+    (0..measured.lattice.levels()).flat_map(of_level).map(known).collect()
+}
+
+/// Walks at all speeds with leaps, now and then under another tolerance.
+fn walk(field: &Field, steps: usize, seed: u64) -> Vec<(DVec3, f64)> {
+    let mut dice = Dice(seed);
+    let [w, h] = field.size().map(f64::from);
+    let extent = field.world_at(w, h, 0.0);
+    let (mut eye, mut px) = (extent * 0.5 + DVec3::Y * 100.0, 30.0);
+    let mut walk = Vec::new();
+    for _ in 0..steps {
+        let speed = 10f64.powf(4.0 * dice.share() - 2.0);
+        match dice.share() {
+            s if s < 0.03 => eye = extent * dice.direction() * 3.0 + DVec3::Y * 500.0 * dice.share(),
+            s if s < 0.05 => px = [3.0, 10.0, 30.0, 100.0][(4.0 * dice.share()) as usize],
+            s if s < 0.15 => (),
+            _ => eye += dice.direction() * speed,
+        }
+        walk.push((eye, px));
+    }
+    walk
+}
+
+/// The set is what it is defined to be: by every sphere alone, without looking at the others.
+#[test]
+fn what_has_split_are_the_spheres_around_the_eye() {
+    for field in [land([100, 140]), noise([40, 33])] {
+        let measured = Measured::new(Arc::clone(&field), 1.0);
+        let (all, mut found) = (diamonds(&measured), Found::default());
+        let (mut splits, mut least, mut most) = (Splits::none(&measured), usize::MAX, 0);
+        for (eye, px) in walk(&field, 60, 4) {
+            let from = viewpoint(&measured, eye, px);
+            assert!(splits.refill(&measured, &from, &mut found, usize::MAX));
+            for known in &all {
+                let is_inside = known.centre.distance(from.eye) < from.reach.radius(known);
+                assert_eq!(splits.contains(known.index), is_inside, "{known:?}");
+            }
+            (least, most) = (least.min(splits.count()), most.max(splits.count()));
+        }
+        assert!(most > 4 * least + 100, "{least} to {most} split");
+    }
+}
+
+fn follows<W: Watch>(field: &Arc<Field>, band: f64, hold: f64, seed: u64) {
+    let measured = Measured::new(Arc::clone(field), band as f32);
+    let (mut follower, mut found) = (Follower::<W>::new(&measured), Found::default());
+    let (mut splits, mut saved) = (Splits::none(&measured), 0);
+    for (step, (eye, px)) in walk(field, 1500, seed).into_iter().enumerate() {
+        let from = Viewpoint { band, hold, ..viewpoint(&measured, eye, px) };
+        assert!(splits.refill(&measured, &from, &mut found, usize::MAX));
+        assert!(follower.follow(&measured, &from, usize::MAX));
+        for &(at, index) in &found.split {
+            assert!(follower.splits().contains(index), "step {step}: {at:?} has not split");
+        }
+        assert_eq!(follower.splits().count(), splits.count(), "step {step}");
+        saved += usize::from(follower.visited() * 2 < found.visited);
+    }
+    assert!(saved > 300, "looked at less in {saved} steps only");
+}
+
+#[test]
+fn made_up_spheres_find_the_same_as_all() {
+    follows::<Shells>(&land([100, 140]), 1.0, 1.0, 1);
+    follows::<Shells>(&noise([70, 33]), 1.3, 1.0, 2);
+    follows::<Shells>(&land([129, 129]), 1.0, 1.1, 3);
+}
+
+#[test]
+fn spheres_that_cover_others_find_the_same_as_all() {
+    follows::<Covers>(&land([100, 140]), 1.0, 1.0, 1);
+    follows::<Covers>(&noise([70, 33]), 1.3, 1.0, 2);
+    follows::<Covers>(&land([129, 129]), 1.0, 1.1, 3);
+}
+
+#[test]
+fn two_queues_find_the_same_as_all() {
+    follows::<Queues>(&land([100, 140]), 1.0, 1.0, 5);
+    follows::<Queues>(&noise([70, 33]), 1.3, 1.0, 6);
+    follows::<Queues>(&land([129, 129]), 1.0, 1.1, 7);
+}
+
+#[test]
+fn a_follower_gives_up_beyond_its_limit_and_recovers() {
+    let field = land([100, 140]);
+    let measured = Measured::new(Arc::clone(&field), 1.0);
+    let (mut follower, mut found) = (Follower::<Shells>::new(&measured), Found::default());
+    let mut splits = Splits::none(&measured);
+    let views: Vec<_> = walk(&field, 400, 8).iter().map(|&(eye, px)| viewpoint(&measured, eye, px)).collect();
+    let count = |from: &Viewpoint| {
+        assert!(splits.refill(&measured, from, &mut found, usize::MAX));
+        splits.count()
+    };
+    let counts: Vec<_> = views.iter().map(count).collect();
+    let mut sorted = counts.clone();
+    sorted.sort_unstable();
+    let (limit, mut gave_up) = (sorted[sorted.len() / 2], 0);
+    for (from, count) in views.iter().zip(counts) {
+        let follows = follower.follow(&measured, from, limit);
+        assert_eq!(follows, count <= limit);
+        assert!(!follows || follower.splits().count() == count);
+        gave_up += usize::from(!follows);
+    }
+    assert!(gave_up > 20, "gave up {gave_up} times");
+}
+
+/// Walks a scene once with each criterion: the same lists, to the byte.
+#[test]
+fn the_criteria_draw_the_same() {
+    let field = land([150, 111]);
+    for morph in ["morph=off", "morph=on"] {
+        let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
+        let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion, morph]));
+        for (eye, px) in walk(&field, 200, 11) {
+            let lists = rooms.each_mut().map(|room| {
+                let mut list = DrawList::default();
+                room.select(&view(eye, px), &mut list);
+                (list.draws, list.streamed.indices, bytemuck::cast_slice::<_, u8>(&list.streamed.vertices).to_vec())
+            });
+            assert!(lists.iter().all(|list| *list == lists[0]), "at {eye}");
+        }
+    }
+}
+
+/// The most that a drawn height above a sample changes from one step of a flight to the next, metres a metre, and how
+/// often wedges split or merge there.
+fn change(field: &Arc<Field>, settings: &[&str]) -> (f64, usize) {
+    let mut room = super::technique(field, "sphere-tree", settings);
+    let (mut last, mut largest, mut switches) = (None::<(Vec<f64>, u64)>, 0.0f64, 0);
+    for step in 0..150 {
+        let at = DVec3::new(400.0, 120.0, 300.0) + DVec3::new(0.6, 0.0, 0.8) * f64::from(step) * STEP_M;
+        let (view, mut list) = (view(at, 10.0), DrawList::default());
+        room.select(&view, &mut list);
+        let heights = super::heights(field, &view, room.resident(), &list);
+        if let Some((before, triangles)) = &last {
+            let changes = heights.iter().zip(before).map(|(a, b)| (a - b).abs()).filter(|change| change.is_finite());
+            largest = largest.max(changes.fold(0.0, f64::max) / STEP_M);
+            switches += usize::from(*triangles != list.triangles());
+        }
+        last = Some((heights, list.triangles()));
+    }
+    (largest, switches)
+}
+
+/// Length of a step, metres.
+const STEP_M: f64 = 0.5;
+
+#[test]
+fn nothing_pops_where_vertices_fade_in() {
+    let field = hills();
+    let (pop, switches) = change(&field, &["morph=off"]);
+    let (fade, fading_switches) = change(&field, &["morph=on"]);
+    println!("changes of {pop} and {fade} m a metre, {switches} and {fading_switches} switches");
+    assert!(switches > 50 && fading_switches > 50);
+    assert!(pop > 10.0 * fade, "{pop} m a metre without fading, {fade} with it");
+}
+
+/// A wedge that has just split stays so until the eye is a little further away.
+#[test]
+fn what_is_held_does_not_switch_to_and_fro() {
+    let field = hills();
+    let switches = |hold: &str| {
+        let mut room = super::technique(&field, "sphere-tree", &[hold]);
+        let counts = (0..40).map(|step| {
+            let mut list = DrawList::default();
+            room.select(&view(DVec3::new(500.0 + 3.0 * f64::from(step % 2), 120.0, 600.0), 10.0), &mut list);
+            list.triangles()
+        });
+        let counts: Vec<_> = counts.collect();
+        counts.windows(2).filter(|pair| pair[0] != pair[1]).count()
+    };
+    assert!(switches("hold=off") > 30);
+    assert!(switches("hold=on") <= 1);
+}
