@@ -206,8 +206,8 @@ fn on_one_core_the_list_is_the_same() {
                 list
             });
             assert!(parallel.draws == serial.draws);
-            assert_eq!(parallel.streamed.indices, serial.streamed.indices);
-            assert_eq!(parallel.streamed.vertices, serial.streamed.vertices);
+            assert!(parallel.streamed.indices == serial.streamed.indices, "{level}");
+            assert!(parallel.streamed.vertices == serial.streamed.vertices, "{level}");
             rows += parallel.draws.len();
         }
     }

@@ -58,7 +58,8 @@ struct Quad {
 }
 
 impl Order {
-    /// A quad begins with the index `first`; see [`Crossing::key`].
+    /// A quad begins with the index `first`: the square of a level at a place, counted from the run's first corner, or a
+    /// pair of squares that begins with it. `page` is the level of pages.
     #[inline]
     pub fn begin(&mut self, crossing: &Crossing, page: u32, (level, at): (u32, [i32; 2]), is_pair: bool, first: usize) {
         let (key, first) = (crossing.key(page, level, at, is_pair), first as u32);
