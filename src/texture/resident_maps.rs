@@ -306,6 +306,19 @@ mod tests {
         }
     }
 
+    /// Where there is no room for both, what stands in gives way.
+    #[test]
+    fn what_stands_in_does_not_stand_in_the_way() {
+        let maps = maps();
+        let mut set = ResidentMaps::new(Arc::clone(&maps), COARSEST + maps.bytes(1)).unwrap();
+        let [coarser, finer] = [3, 1].map(|level| Map { page: [2, 2], level });
+        for wanted in [coarser, finer] {
+            frame(&mut set, &[wanted]);
+            set.wait();
+            assert_eq!(frame(&mut set, &[wanted]), [wanted]);
+        }
+    }
+
     #[test]
     fn a_budget_below_the_coarsest_maps_is_refused() {
         let refused = ResidentMaps::new(maps(), COARSEST - 1).err();

@@ -63,13 +63,13 @@ fn view(cave: &Cave, k: u64) -> View {
     let size = cave.floor().size();
     let at = [0, 1].map(|n| (share(n as u64 + 1) * f64::from(size[n])) as u32);
     let [low, high] = [cave.floor(), cave.ceiling()].map(|field| f64::from(field.height(at[0], at[1])));
-    let aside = [0.0, 40.0, -40.0][if k % 3 == 0 { 1 + (k / 3 % 2) as usize } else { 0 }];
+    let aside = [0.0, 40.0, -40.0][if k.is_multiple_of(3) { 1 + (k / 3 % 2) as usize } else { 0 }];
     let eye = cave.floor().world_at(f64::from(at[0]) + 0.3, f64::from(at[1]) + 0.4, low * 0.6 + high * 0.4 + aside);
     let lens = match k % 7 {
         6 => Lens::Orthographic { width: 60.0, far: 1e4 },
         _ => Lens::Perspective { fov_x: 0.4 + 1.6 * share(3) },
     };
-    let pitch = if k % 3 == 0 { -aside } else { 60.0 * share(4) - 30.0 };
+    let pitch = if k.is_multiple_of(3) { -aside } else { 60.0 * share(4) - 30.0 };
     let world_from_eye = View::turned(360.0 * share(5), pitch, 20.0 * share(6));
     let tolerance = Tolerance { px: 0.2 + 3.0 * share(7), metric: Metric::Certified };
     View { eye, world_from_eye, lens, size: SIZE, near: 0.05, tolerance, time_s: 0.0 }
