@@ -82,7 +82,7 @@ fn build(case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
     let entry = lod::find(name).with_context(|| format!("no technique {name}"))?;
     let given: Vec<_> = case.settings.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
     let settings = Settings::new(entry, variant, &given).map_err(|e| anyhow!("{}: {e}", case.technique))?;
-    Ok((entry.build)(Arc::clone(field), &settings))
+    entry.prepare(field, &settings).map_err(anyhow::Error::msg)
 }
 
 impl Laboratory for DeviceLaboratory {

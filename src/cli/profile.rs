@@ -125,7 +125,8 @@ fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<
         let name = variant.map_or(entry.name.to_string(), |variant| format!("{}:{variant}", entry.name));
         let settings = Settings::new(entry, variant, &args.technique.settings).map_err(anyhow::Error::msg)?;
         let _spinner = report::preparing(common, &name, &settings.progress);
-        Ok(Form { technique: (entry.build)(Arc::clone(field), &settings), name })
+        let technique = entry.prepare(field, &settings).map_err(anyhow::Error::msg)?;
+        Ok(Form { technique, name })
     };
     variants.into_iter().map(form).collect()
 }

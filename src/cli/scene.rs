@@ -353,7 +353,7 @@ impl TechniqueArgs {
     pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
         let (entry, settings) = self.settings()?;
         let _spinner = report::preparing(common, entry.name, &settings.progress);
-        Ok((entry.build)(Arc::clone(field), &settings))
+        entry.prepare(field, &settings).map_err(anyhow::Error::msg)
     }
 
     /// The tolerance under the metric.

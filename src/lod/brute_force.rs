@@ -18,6 +18,7 @@ pub const ENTRY: Entry = Entry {
     paper: "none",
     variants: &[],
     settings: &[],
+    most_samples: u64::MAX,
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),
 };
 

@@ -95,8 +95,22 @@ pub struct Entry {
     pub variants: &'static [Variant],
     /// What can be set, with defaults.
     pub settings: &'static [Setting],
-    /// Prepares the technique for a field.
+    /// The most samples of a field, tiling included: it keeps something of each of them.
+    pub most_samples: u64,
+    /// Prepares the technique for a field of at most so many.
     pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
+}
+
+impl Entry {
+    /// The technique prepared for a field, or why not.
+    pub fn prepare(&self, field: &Arc<Field>, settings: &Settings) -> Result<Box<dyn Technique>, String> {
+        let [w, h] = field.size().map(u64::from);
+        if w * h > self.most_samples {
+            let Self { name, most_samples, .. } = self;
+            return Err(format!("{name}: {w} x {h} samples, and it keeps something of each: at most {most_samples}"));
+        }
+        Ok((self.build)(Arc::clone(field), settings))
+    }
 }
 
 /// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the

@@ -82,7 +82,7 @@ impl Stage {
         let swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
         let formats = swapchain.formats();
         let (entry, settings) = &setup.technique;
-        let technique = (entry.build)(Arc::clone(&setup.field), settings);
+        let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         let statistics = setup.field.statistics();
         Ok(Self {
@@ -111,7 +111,7 @@ impl Stage {
 
     /// Changes the technique: its geometry, the slots' room, and pipelines for what it needs.
     pub fn set_technique(&mut self, setup: &Setup, look: &Look, entry: &Entry, settings: &Settings) -> Result<()> {
-        self.technique = (entry.build)(Arc::clone(&setup.field), settings);
+        self.technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         self.list.clear();
         self.terrain.retarget(self.technique.kept())?;
         self.set_look(setup, look)

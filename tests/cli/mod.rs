@@ -287,6 +287,14 @@ mod with_a_device {
     }
 
     #[test]
+    fn a_field_too_large_for_a_technique_is_refused() {
+        let folder = folder();
+        let tiled = ["export", "demo", "--tile", "400,400", "-o", "m.obj", "--technique"];
+        refused(folder.path(), &[&tiled[..], &["sphere-tree"]].concat(), &["sphere-tree", "samples", "at most"]);
+        refused(folder.path(), &[&tiled[..], &["smooth-tiles"]].concat(), &["smooth-tiles", "samples", "at most"]);
+    }
+
+    #[test]
     fn a_benchmark_holds_what_it_is_asked_for() {
         let folder = folder();
         for wrong in ["0", "inf", "many"] {

@@ -94,6 +94,7 @@ pub const ENTRY: Entry = Entry {
             about: "where blocks meet: on common edges, or with skirts under edges of their own, as published",
         },
     ],
+    most_samples: u64::MAX,
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };
 

@@ -74,6 +74,7 @@ pub const ENTRY: Entry = Entry {
             about: "whether a level goes over into the next, or changes at once",
         },
     ],
+    most_samples: u64::MAX,
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
 };
 

@@ -93,6 +93,7 @@ pub const ENTRY: Entry = Entry {
             about: "chunks on the device at most, MiB",
         },
     ],
+    most_samples: 1 << 30,
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
 };
 

@@ -104,6 +104,7 @@ pub const ENTRY: Entry = Entry {
             about: "whether vertices of level=uniform go over into the next level, or are there at once",
         },
     ],
+    most_samples: u64::MAX,
     build: |field, settings| Box::new(SortedStrips::new(field, settings)),
 };
 

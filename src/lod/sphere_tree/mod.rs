@@ -82,6 +82,7 @@ pub const ENTRY: Entry = Entry {
             about: "whether a wedge merges a little further away than it splits",
         },
     ],
+    most_samples: 1 << 27,
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
 };
 
