@@ -95,7 +95,7 @@ pub struct Entry {
     pub variants: &'static [Variant],
     /// What can be set, with defaults.
     pub settings: &'static [Setting],
-    /// The most samples of a field, tiling included: it keeps something of each of them.
+    /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
     pub most_samples: u64,
     /// Prepares the technique for a field of at most so many.
     pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
@@ -107,7 +107,7 @@ impl Entry {
         let [w, h] = field.size().map(u64::from);
         if w * h > self.most_samples {
             let Self { name, most_samples, .. } = self;
-            return Err(format!("{name}: {w} x {h} samples, and it keeps something of each: at most {most_samples}"));
+            return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
         }
         Ok((self.build)(Arc::clone(field), settings))
     }

@@ -9,7 +9,7 @@ use crate::bench::rows::{Decision, Plan};
 use crate::bench::statistics::Estimate;
 
 /// A table whose cells are HTML already.
-fn table(columns: &[String], rows: &[Vec<String>], series: &[Option<String>]) -> String {
+pub fn table(columns: &[String], rows: &[Vec<String>], series: &[Option<String>]) -> String {
     let mut html = String::from("<table><thead><tr>");
     columns.iter().for_each(|column| html += &format!("<th scope=\"col\">{}</th>", escape(column)));
     html += "</tr></thead><tbody>";
