@@ -21,10 +21,10 @@ pub const CASES: &[Case] = &[
     case("origin at 1e7 m", Kind::Land(|| at(1e7))),
     case("origin at the Earth's radius and a millimetre", Kind::Land(|| at(jitter::EARTH_M))),
     case("500 000 x 500 000 samples", Kind::Each(half_a_million)),
-    case("jitter at 0 m", Kind::Alone("vertex program", || jitter::findings(0.0))),
-    case("jitter at 1e5 m", Kind::Alone("vertex program", || jitter::findings(1e5))),
-    case("jitter at 1e7 m", Kind::Alone("vertex program", || jitter::findings(1e7))),
-    case("jitter at the Earth's radius", Kind::Alone("vertex program", || jitter::findings(jitter::EARTH_M))),
+    case("jitter at 0 m", Kind::Alone("vertex-program", || jitter::findings(0.0))),
+    case("jitter at 1e5 m", Kind::Alone("vertex-program", || jitter::findings(1e5))),
+    case("jitter at 1e7 m", Kind::Alone("vertex-program", || jitter::findings(1e7))),
+    case("jitter at the Earth's radius", Kind::Alone("vertex-program", || jitter::findings(jitter::EARTH_M))),
 ];
 
 fn at(origin_m: f64) -> Land {
