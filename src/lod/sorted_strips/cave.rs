@@ -75,7 +75,7 @@ impl CaveStrips {
             pages: Pages::none(grid),
             splits: Splits::new(grid),
             rows: Vec::new(),
-            is_back_to_front: settings.word("order") == "back",
+            is_back_to_front: settings.word("order") != "front",
             limits,
             nothing: Geometry::default(),
         }

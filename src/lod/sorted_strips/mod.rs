@@ -13,7 +13,8 @@
 //!   [`certified`]), the set closed over squares that touch ([`splits`]);
 //! - shapes are combined where finer quads are on several sides of one: the published five are not enough there;
 //! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
-//!   one direction. `order=back` turns the list round: both orders are the same triangles;
+//!   one direction. `order=back` turns the list round: both orders are the same triangles. `order=painter` draws it so
+//!   without a depth buffer, and the picture is the same to the pixel;
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
 //!   row and column of pages, where some rays go against the walk ([`order`]);
 //! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
@@ -54,7 +55,7 @@ use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
+use crate::draw::{Draw, DrawList, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::view::{Containment, View};
 
@@ -87,9 +88,9 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "order",
-            values: Values::Words(&["front", "back"]),
+            values: Values::Words(&["front", "back", "painter"]),
             default: "front",
-            about: "whether the nearest triangle comes first, or the furthest",
+            about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer is used",
         },
         Setting {
             key: "edge",
@@ -120,6 +121,7 @@ struct SortedStrips {
     edge: Option<f64>,
     blends: bool,
     is_back_to_front: bool,
+    hiding: Hiding,
     is_serial: bool,
     limits: Limits,
     nothing: Geometry,
@@ -146,7 +148,8 @@ impl SortedStrips {
             workers: Vec::new(),
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
-            is_back_to_front: settings.word("order") == "back",
+            is_back_to_front: settings.word("order") != "front",
+            hiding: if settings.word("order") == "painter" { Hiding::ByOrder } else { Hiding::ByDepth },
             is_serial: settings.variant() == Some("serial"),
             limits,
             nothing: Geometry::default(),
@@ -285,6 +288,10 @@ impl Technique for SortedStrips {
 
     fn keeps_tolerance(&self) -> bool {
         self.edge.is_none()
+    }
+
+    fn manner(&self) -> Manner {
+        Manner { hiding: self.hiding, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
