@@ -104,7 +104,7 @@ impl CaveStrips {
         [self.cave.floor(), self.cave.ceiling()]
             .into_iter()
             .zip(&self.errors)
-            .all(|(field, errors)| Certified::new(field, errors, &self.pages, view, most).split(&mut self.splits))
+            .all(|(field, errors)| Certified::new(field, errors, &self.pages, [view; 2], most).split(&mut self.splits))
     }
 
     /// Walks the rows of a frame; `false` if they do not fit.

@@ -19,6 +19,10 @@
 //!   row and column of pages, where some rays go against the walk ([`order`]);
 //! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
 //!   paper's variant in three dimensions needs, and a bound would be spent on it;
+//! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
+//!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
+//!   3.0 px and the 99.9th percentile from 26 px to 1.05 px, for a quarter more triangles (282 k to 351 k); a band
+//!   without end has the same jumps and 371 k;
 //! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
 //!
 //! The surface is made of the samples at quads' corners and middles; plain quads have the crate's alternating
@@ -45,7 +49,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
-use self::certified::{Certified, bounds};
+use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
 use self::join::{join, starts};
 use self::measure::Errors;
@@ -93,6 +97,12 @@ pub const ENTRY: Entry = Entry {
             about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer is used",
         },
         Setting {
+            key: "guard",
+            values: Values::Number(0.0, 1000.0),
+            default: "0.25",
+            about: "width of a band around the picture, in parts of it, as fine for level=certified as the picture",
+        },
+        Setting {
             key: "edge",
             values: Values::Number(0.01, 1e4),
             default: "20",
@@ -119,6 +129,8 @@ struct SortedStrips {
     workers: Vec<Worker>,
     /// Length of a triangle's side, tolerances, if levels are uniform.
     edge: Option<f64>,
+    /// Width of the band around the picture that is as fine as the picture, pictures.
+    guard: f64,
     blends: bool,
     is_back_to_front: bool,
     hiding: Hiding,
@@ -147,6 +159,7 @@ impl SortedStrips {
             splits: Splits::new(grid),
             workers: Vec::new(),
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
+            guard: settings.number("guard"),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
             is_back_to_front: settings.word("order") != "front",
             hiding: if settings.word("order") == "painter" { Hiding::ByOrder } else { Hiding::ByDepth },
@@ -212,9 +225,10 @@ impl SortedStrips {
             return self.walk(&levels, gaze, rows, workers);
         }
         self.splits.clear();
+        let seen = guarded(view, self.guard);
         // A split square has at least six triangles more.
         let most = self.limits.indices / 18 + 1;
-        let certified = Certified::new(&self.field, &self.errors, &self.pages, view, most);
+        let certified = Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most);
         if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
     }
 
