@@ -143,6 +143,7 @@ impl Stage {
         self.select(technique, view);
         let select_ms = ms(started);
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
+        self.frames.counts_passed = copy == Copy::PictureAndDepth;
         let mut recording = self.frames.begin()?;
         let uploading = Instant::now();
         self.terrain.prepare(&mut recording, &frame, &self.list)?;

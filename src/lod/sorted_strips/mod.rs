@@ -38,6 +38,7 @@ pub mod join;
 pub mod measure;
 pub mod order;
 pub mod pages;
+pub mod sequence;
 pub mod shapes;
 pub mod splits;
 pub mod table;
@@ -54,12 +55,13 @@ use self::footprint::Footprint;
 use self::join::{join, starts};
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
+use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::view::{Containment, View};
 
@@ -92,9 +94,9 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "order",
-            values: Values::Words(&["front", "back", "painter"]),
+            values: Values::Words(Sequence::WORDS),
             default: "front",
-            about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer is used",
+            about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer; or in no order",
         },
         Setting {
             key: "guard",
@@ -132,8 +134,7 @@ struct SortedStrips {
     /// Width of the band around the picture that is as fine as the picture, pictures.
     guard: f64,
     blends: bool,
-    is_back_to_front: bool,
-    hiding: Hiding,
+    sequence: Sequence,
     is_serial: bool,
     limits: Limits,
     nothing: Geometry,
@@ -161,8 +162,7 @@ impl SortedStrips {
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
             guard: settings.number("guard"),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
-            is_back_to_front: settings.word("order") != "front",
-            hiding: if settings.word("order") == "painter" { Hiding::ByOrder } else { Hiding::ByDepth },
+            sequence: Sequence::of(settings.word("order")),
             is_serial: settings.variant() == Some("serial"),
             limits,
             nothing: Geometry::default(),
@@ -255,20 +255,8 @@ impl SortedStrips {
             list.draws.push(Draw { source, topology, indices: first..end, instances, first_vertex: 0 });
             first = end;
         }
-        if self.is_back_to_front {
-            turn_round(list);
-        }
+        self.sequence.arrange(list);
     }
-}
-
-/// Turns the order of all triangles round.
-fn turn_round(list: &mut DrawList) {
-    let count = list.streamed.indices.len() as u32;
-    list.streamed.indices.reverse();
-    // Each triangle's own three too: they turn as before.
-    list.streamed.indices.chunks_exact_mut(3).for_each(|t| t.reverse());
-    list.draws.reverse();
-    list.draws.iter_mut().for_each(|draw| draw.indices = count - draw.indices.end..count - draw.indices.start);
 }
 
 impl Technique for SortedStrips {
@@ -305,7 +293,7 @@ impl Technique for SortedStrips {
     }
 
     fn manner(&self) -> Manner {
-        Manner { hiding: self.hiding, ..Manner::default() }
+        Manner { hiding: self.sequence.hiding(), ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
