@@ -51,6 +51,7 @@ const TIMES: &[Column] = &[
     ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
     ("below a pixel, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
     ("overdraw", |r| r.errors.as_ref()?.economy.as_ref()?.overdraw.map(number)),
+    ("past depth, a pixel", |r| r.errors.as_ref()?.economy.as_ref()?.passed.map(number)),
     ("held, %", |r| r.time.as_ref()?.held.map(|h| number(100.0 * h.settled))),
     ("mean tolerance, px", |r| r.time.as_ref()?.held.map(|h| number(h.tolerance_px.mean))),
     ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),
