@@ -105,14 +105,15 @@ pub struct Decision {
 impl ScenePlan {
     /// The plan for a field and a look, or which limit of the device the field exceeds.
     pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
-        let stored = field.stored();
+        let (stored, is_endless) = (field.stored(), field.land().is_some());
         let page_shift = if stored.iter().all(|&n| n <= device.image_side) { 0 } else { device.image_side.ilog2() };
         let plan = Self {
             coded: matches!(field.samples(), Samples::Coded { .. }),
             tiled: field.is_tiled(),
             holes: field.holes().count() > 0,
             fog: look.fog > 0.0,
-            colour: look.colour,
+            // Without samples there is nothing to be compared with.
+            colour: if is_endless && look.colour == Colour::Error { Colour::Height } else { look.colour },
             wireframe: look.wireframe,
             page_shift,
             filtered: device.filters_heights && page_shift == 0,

@@ -8,7 +8,7 @@ use anyhow::{Result, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::bench::MeasureArgs;
-use super::{Common, report};
+use super::{Common, endless, report};
 use crate::bench::held::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
@@ -168,6 +168,7 @@ fn of_files(
         if args.kit { kit::REAL_PATHS.iter().map(|name| name.to_string()).collect() } else { args.path.clone() };
     for file in &args.terrain {
         let field = Arc::new(args.reading.load(common, file)?.field);
+        endless::need_samples(&field, "bench")?;
         let name = Path::new(file).file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned());
         let terrain = Terrain { name, size: field.size(), spacing_m: field.spacing };
         if let Some((other, _)) =

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod cases;
+pub mod endless;
 pub mod export;
 pub mod info;
 #[cfg(feature = "vulkan")]

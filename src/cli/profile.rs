@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::render::open;
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
-use super::{Common, Outcome, report};
+use super::{Common, Outcome, endless, report};
 use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;
 use crate::height::Field;
@@ -76,6 +76,7 @@ struct Capture {
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let field = Arc::new(args.terrain.load(common)?.field);
+    endless::need_samples(&field, "profile")?;
     let (look, overlay) = args.look.build(&args.terrain.terrain)?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;

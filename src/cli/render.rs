@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
-use super::{Common, Outcome, report};
+use super::{Common, Outcome, endless, report};
 use crate::bench::rows::extended;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -128,6 +128,9 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         return Err(Error::new(output, "extension", "expected .png").into());
     }
     let field = Arc::new(args.terrain.load(common)?.field);
+    if args.measure {
+        endless::need_samples(&field, "--measure")?;
+    }
     let (look, overlay) = args.look.build(&args.terrain.terrain)?;
     ensure!(args.time.is_finite(), "--time {}: expected seconds", args.time);
     let look = look.after(args.time);

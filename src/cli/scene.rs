@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{Common, report};
+use super::{Common, endless, report};
 use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Look};
@@ -16,7 +16,7 @@ use crate::view::{Lens, Metric, Tolerance, View};
 /// Where heights come from.
 #[derive(Args, Debug, Clone)]
 pub struct TerrainArgs {
-    /// A height file of any supported format, a directory of web-map tiles, or `demo`.
+    /// A height file of any supported format, a directory of web-map tiles, `demo`, or `endless[:SEED]`.
     pub terrain: String,
     /// How they are read.
     #[command(flatten)]
@@ -254,6 +254,9 @@ impl ReadArgs {
             zoom: self.zoom,
             max_samples: self.max_samples,
         };
+        if let Some(land) = endless::named(terrain, &options) {
+            return land;
+        }
         let _spinner = report::spinner(common, format!("reading {terrain}"));
         let mut loaded = if is_demo(terrain) {
             load_bytes("demo", demo::PICTURE, &demo_options(options))?

@@ -42,7 +42,7 @@ pub struct Geometry {
     pub lattice: Vec<LatticeVertex>,
     /// Vertices with heights, for [`Source::Resident`] and [`Source::Streamed`].
     pub vertices: Vec<ExplicitVertex>,
-    /// Normals of the resident vertices, one each, where they are lit by them; else none.
+    /// Normals of the vertices, one each, where they are lit by them; else none.
     pub normals: Vec<VertexNormals>,
     /// Indices into one of the two, as the draw's source says.
     pub indices: Vec<u32>,
@@ -163,6 +163,8 @@ pub struct Limits {
     pub instances: usize,
     /// Streamed explicit vertices in a list.
     pub vertices: usize,
+    /// Normals of streamed vertices in a list.
+    pub normals: usize,
     /// Streamed indices in a list.
     pub indices: usize,
     /// Bytes of uploads in a list.
@@ -239,6 +241,7 @@ impl DrawList {
         self.instances.clear();
         self.streamed.lattice.clear();
         self.streamed.vertices.clear();
+        self.streamed.normals.clear();
         self.streamed.indices.clear();
         self.uploads.clear();
         self.submission = Submission::default();
@@ -286,6 +289,7 @@ impl DrawList {
             draws: self.draws.len(),
             instances: self.instances.len(),
             vertices: self.streamed.vertices.len(),
+            normals: self.streamed.normals.len(),
             indices: self.streamed.indices.len(),
             upload_bytes: self.uploads.iter().map(bytes).sum(),
         }
@@ -298,6 +302,7 @@ impl Limits {
         size.draws <= self.draws
             && size.instances <= self.instances
             && size.vertices <= self.vertices
+            && size.normals <= self.normals
             && size.indices <= self.indices
             && size.upload_bytes <= self.upload_bytes
     }

@@ -48,6 +48,7 @@ struct Slot {
     instances: Buffer,
     commands: Buffer,
     vertices: Buffer,
+    normals: Buffer,
     indices: Buffer,
     staging: Buffer,
 }
@@ -156,6 +157,7 @@ impl Terrain {
         slot.frame.write(0, bytemuck::bytes_of(frame));
         slot.instances.write(0, cast_slice(&list.instances));
         slot.vertices.write(0, cast_slice(&list.streamed.vertices));
+        slot.normals.write(0, cast_slice(&list.streamed.normals));
         slot.indices.write(0, cast_slice(&list.streamed.indices));
         for (k, draw) in list.draws.iter().enumerate() {
             slot.commands.write(k * COMMAND, &command_bytes(draw));
@@ -325,14 +327,15 @@ impl Terrain {
 
     pub(super) fn bind_geometry(&self, r: &Recording, source: Source) {
         let slot = &self.slots[r.slot];
-        let (vertices, indices) = match source {
-            Source::Lattice => (&self.resident.lattice, &self.resident.indices),
-            Source::Resident => (&self.resident.vertices, &self.resident.indices),
-            Source::Streamed => (&slot.vertices, &slot.indices),
+        let resident = &self.resident;
+        let (vertices, normals, indices) = match source {
+            Source::Lattice => (&resident.lattice, &resident.normals, &resident.indices),
+            Source::Resident => (&resident.vertices, &resident.normals, &resident.indices),
+            Source::Streamed => (&slot.vertices, &slot.normals, &slot.indices),
         };
         // SAFETY: the buffers live until the frame has ended.
         unsafe {
-            let buffers = [vertices.raw, slot.instances.raw, self.resident.normals.raw];
+            let buffers = [vertices.raw, slot.instances.raw, normals.raw];
             self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0; 3]);
             self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, vk::IndexType::UINT32);
         }
@@ -402,6 +405,7 @@ impl Slot {
             instances: host("instances", limits.instances * size_of::<Instance>(), Usage::VERTEX_BUFFER)?,
             commands: host("indirect commands", limits.draws * COMMAND, Usage::INDIRECT_BUFFER)?,
             vertices: host("streamed vertices", limits.vertices * size_of::<ExplicitVertex>(), Usage::VERTEX_BUFFER)?,
+            normals: host("streamed normals", limits.normals * size_of::<VertexNormals>(), Usage::VERTEX_BUFFER)?,
             indices: host("streamed indices", limits.indices * 4, Usage::INDEX_BUFFER)?,
             staging: host("upload staging", limits.upload_bytes, Usage::TRANSFER_SRC)?,
         })

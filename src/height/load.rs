@@ -20,7 +20,7 @@ pub enum HoleFill {
 }
 
 /// Wishes about how a file is read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Distance of neighbouring samples (x, z), metres, instead of what the file says.
     pub spacing: Option<[f64; 2]>,

@@ -2,6 +2,7 @@
 
 mod archive;
 mod asc;
+pub mod bezier;
 mod bil;
 pub mod bounds;
 pub mod cave;
@@ -37,8 +38,11 @@ pub use sample::{Order, SampleType};
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+
+use self::bezier::Bezier;
 
 /// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.
 #[derive(Debug, thiserror::Error)]
@@ -186,6 +190,7 @@ pub struct Field {
     pub crs: Option<String>,
     /// The file that it was read from, if what takes long to work out of it may be kept beside that.
     pub source: Option<PathBuf>,
+    land: Option<Arc<Bezier>>,
 }
 
 /// Lowest, highest and mean height of the samples that are no holes, metres.
@@ -209,9 +214,24 @@ impl Field {
         assert_eq!(samples.len(), x_count as usize * z_count as usize);
         assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
         let (stored, tiles, origin) = ([x_count, z_count], [1, 1], [0.0, 0.0]);
-        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs: None, source: None };
+        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs: None, source: None, land: None };
         field.fill_holes();
         field
+    }
+
+    /// A land that no samples are kept of: heights are worked out when they are asked for, on a lattice of
+    /// [`bezier::LATTICE`] places a side. What is held in memory, and so its statistics, are of a raster of it.
+    pub fn endless(land: Arc<Bezier>) -> Self {
+        const SIDE: u32 = 257;
+        let place = |k: u32| f64::from(k) * bezier::SIDE_M / f64::from(SIDE - 1);
+        let heights = (0..SIDE * SIDE).map(|k| land.height([place(k % SIDE), place(k / SIDE)]) as f32);
+        let (samples, holes) = (Samples::F32(heights.collect()), Holes::none((SIDE * SIDE) as usize));
+        Self { land: Some(land), ..Self::new(samples, [SIDE; 2], [bezier::SPACING_M; 2], holes) }
+    }
+
+    /// What heights are worked out from, where no samples are kept of them.
+    pub fn land(&self) -> Option<&Arc<Bezier>> {
+        self.land.as_ref()
     }
 
     /// The field repeated `tiles` times along (x, z); sample (0, 0) follows the last one.
@@ -222,10 +242,13 @@ impl Field {
 
     /// Samples along (x, z), tiling included.
     pub fn size(&self) -> [u32; 2] {
+        if self.land.is_some() {
+            return [bezier::LATTICE; 2];
+        }
         [self.stored[0] * self.tiles[0], self.stored[1] * self.tiles[1]]
     }
 
-    /// Samples held in memory along (x, z).
+    /// Samples held in memory along (x, z): fewer than [`Self::size`] where the field repeats or is endless.
     pub fn stored(&self) -> [u32; 2] {
         self.stored
     }
@@ -257,6 +280,9 @@ impl Field {
     /// Height of sample `(i, j)`, metres; always finite.
     #[inline]
     pub fn height(&self, i: u32, j: u32) -> f32 {
+        if let Some(land) = &self.land {
+            return land.height([i, j].map(|n| f64::from(n) * bezier::SPACING_M)) as f32;
+        }
         self.samples.height(self.index(i, j))
     }
 

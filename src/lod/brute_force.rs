@@ -19,6 +19,7 @@ pub const ENTRY: Entry = Entry {
     variants: &[],
     settings: &[],
     most_samples: 1 << 32,
+    takes_endless: false,
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),
 };
 

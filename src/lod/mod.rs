@@ -97,6 +97,8 @@ pub struct Entry {
     pub settings: &'static [Setting],
     /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
     pub most_samples: u64,
+    /// Whether it takes a land without samples ([`Field::land`]).
+    pub takes_endless: bool,
     /// Prepares the technique for a field of at most so many.
     pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
 }
@@ -105,8 +107,12 @@ impl Entry {
     /// The technique prepared for a field, or why not.
     pub fn prepare(&self, field: &Arc<Field>, settings: &Settings) -> Result<Box<dyn Technique>, String> {
         let [w, h] = field.size().map(u64::from);
-        if w * h > self.most_samples {
-            let Self { name, most_samples, .. } = self;
+        let Self { name, most_samples, .. } = self;
+        if field.land().is_some() && !self.takes_endless {
+            let able: Vec<_> = TECHNIQUES.iter().filter(|entry| entry.takes_endless).map(|entry| entry.name).collect();
+            return Err(format!("{name}: it needs samples, and this land has none: try {}", able.join(", ")));
+        }
+        if field.land().is_none() && w * h > self.most_samples {
             return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
         }
         Ok((self.build)(Arc::clone(field), settings))

@@ -2,9 +2,11 @@
 //! a frame needs, how fine.
 
 pub mod detail;
+pub mod hidden;
 pub mod mip_spheres;
 mod noise;
 pub mod page_maps;
+pub mod pieces;
 pub mod resident_maps;
 pub mod resolution;
 pub mod working_set;

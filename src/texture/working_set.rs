@@ -84,6 +84,13 @@ pub struct WorkingSet {
 }
 
 impl Wedge {
+    /// A number that no other wedge has, down to level 50.
+    pub fn key(&self) -> u64 {
+        // Barycentres of one level are a third of a half side apart or more.
+        let [x, z] = self.barycentre.map(|part| (part * f64::from(1u32 << 29)) as u64);
+        u64::from(self.level) << 58 | x << 29 | z
+    }
+
     /// The node of a level around it.
     fn node(&self, level: u32) -> Node {
         let at = self.barycentre.map(|part| (part * f64::from(1u32 << level)) as u32);

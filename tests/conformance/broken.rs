@@ -225,7 +225,7 @@ impl Technique for Streamed {
     }
     fn limits(&self) -> Limits {
         let most = 6 * self.field.size().iter().product::<u32>() as usize;
-        Limits { draws: 1, instances: 1, vertices: most, indices: most, upload_bytes: 0 }
+        Limits { draws: 1, instances: 1, vertices: most, indices: most, ..Limits::default() }
     }
     fn select(&mut self, view: &View, list: &mut DrawList) {
         let mut blocks = DrawList::default();

@@ -3,6 +3,7 @@
 mod budget;
 mod budget_circle;
 mod clusters;
+mod endless;
 mod morph;
 mod skirts;
 mod smooth_tiles;

@@ -95,6 +95,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: u64::MAX,
+    takes_endless: false,
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };
 

@@ -75,6 +75,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: 1 << 34,
+    takes_endless: false,
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
 };
 

@@ -97,6 +97,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: 1 << 30,
+    takes_endless: false,
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
 };
 

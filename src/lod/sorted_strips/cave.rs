@@ -66,7 +66,7 @@ impl CaveStrips {
             instances: rows,
             vertices: (2 * pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
             indices: 3 * (4 * pages * cells * cells).min(MOST_TRIANGLES),
-            upload_bytes: 0,
+            ..Limits::default()
         };
         Self {
             errors: [cave.floor(), cave.ceiling()].map(|field| Errors::new(field, grid.level)),

@@ -118,6 +118,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: u64::MAX,
+    takes_endless: false,
     build: |field, settings| Box::new(SortedStrips::new(field, settings)),
 };
 
@@ -150,7 +151,7 @@ impl SortedStrips {
             instances: grid.count[0].max(grid.count[1]) as usize,
             vertices: (pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
             indices: 3 * (2 * pages * cells * cells).min(MOST_TRIANGLES),
-            upload_bytes: 0,
+            ..Limits::default()
         };
         Self {
             errors: Errors::new(&field, grid.level),

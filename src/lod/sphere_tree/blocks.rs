@@ -30,6 +30,10 @@ pub struct Blocks {
 impl Blocks {
     /// The blocks of a field.
     pub fn new(field: &Field, lattice: &Lattice) -> Self {
+        if field.land().is_some() {
+            // Wedges tell themselves whether they are in sight.
+            return Self { side: lattice.side(), count: [0; 2], bounds: Vec::new(), seen: Vec::new() };
+        }
         let side = (lattice.side() / MOST_ALONG).max(LEAST_SIDE).min(lattice.side());
         let last = field.size().map(|n| n as i32 - 1);
         let count = last.map(|n| (n - 1) / side + 1);

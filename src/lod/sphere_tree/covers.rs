@@ -43,7 +43,7 @@ impl Watch for Covers {
         }
     }
 
-    fn left(&mut self, index: u32, tickets: &mut Vec<Ticket>) {
+    fn left(&mut self, index: u64, tickets: &mut Vec<Ticket>) {
         if let Some(covered) = self.covered.remove(&index) {
             tickets.extend(covered);
         }
@@ -51,7 +51,7 @@ impl Watch for Covers {
 }
 
 /// A member of the front that covers this one.
-fn cover(front: &mut Front, known: &Known, is_split: bool) -> Option<u32> {
+fn cover(front: &mut Front, known: &Known, is_split: bool) -> Option<u64> {
     let eye = front.from.eye;
     let places = if is_split { SHORT } else { PAST };
     places.into_iter().find_map(|share| {
@@ -67,7 +67,7 @@ fn cover(front: &mut Front, known: &Known, is_split: bool) -> Option<u32> {
 }
 
 /// The diamond of the wedge that is drawn at a place in plan: the one that it is half of, or the one whose split made it.
-fn drawn_at(front: &Front, at: DVec3, is_split: bool) -> Option<u32> {
+fn drawn_at(front: &Front, at: DVec3, is_split: bool) -> Option<u64> {
     let lattice = &front.measured.lattice;
     let side = f64::from(lattice.side());
     let spacing = front.measured.field.spacing;
@@ -81,7 +81,7 @@ fn drawn_at(front: &Front, at: DVec3, is_split: bool) -> Option<u32> {
         let middle = sum.map(|n| n / 2);
         let index = lattice.index(middle).filter(|_| (sum[0] | sum[1]) & 1 == 0);
         let Some(index) = index.filter(|&index| front.splits.contains(index)) else {
-            return if is_split { made } else { index }.map(|index| index as u32);
+            return if is_split { made } else { index }.map(|index| index as u64);
         };
         made = Some(index);
         // On which side of the line from the apex to the middle.

@@ -16,7 +16,7 @@ use super::splits::{Found, Splits};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ticket {
     /// Index of the diamond.
-    pub index: u32,
+    pub index: u64,
     /// No two tickets have the same.
     pub number: u32,
 }
@@ -42,16 +42,16 @@ impl Hasher for IndexHasher {
     }
 
     fn write(&mut self, _bytes: &[u8]) {
-        unreachable!("keys are u32")
+        unreachable!("keys are u64")
     }
 
-    fn write_u32(&mut self, key: u32) {
-        self.0 = (u64::from(key) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }
 
 /// A map by index.
-pub type ByIndex<T> = HashMap<u32, T, BuildHasherDefault<IndexHasher>>;
+pub type ByIndex<T> = HashMap<u64, T, BuildHasherDefault<IndexHasher>>;
 
 /// The front's members by index, with the surroundings that a watch may look at.
 pub struct Front<'a> {
@@ -79,7 +79,7 @@ pub trait Watch: Default + Send {
     fn place(&mut self, front: &mut Front, ticket: Ticket, known: &Known, is_split: bool, slack: f64);
 
     /// A member has left: gives back the tickets of those that relied on it.
-    fn left(&mut self, _index: u32, _tickets: &mut Vec<Ticket>) {}
+    fn left(&mut self, _index: u64, _tickets: &mut Vec<Ticket>) {}
 }
 
 /// A set of split diamonds that follows a viewpoint.
@@ -89,7 +89,7 @@ pub struct Follower<W> {
     watch: W,
     next_number: u32,
     /// To look at: what may split, and what may merge.
-    fresh: [Vec<u32>; 2],
+    fresh: [Vec<u64>; 2],
     tickets: Vec<Ticket>,
     last: Option<Viewpoint>,
     visited: usize,
@@ -172,22 +172,22 @@ impl<W: Watch> Follower<W> {
     }
 
     fn add(&mut self, at: Place, index: usize, is_split: bool) {
-        self.members.insert(index as u32, Member { at, is_split, number: u32::MAX });
-        self.fresh[usize::from(is_split)].push(index as u32);
+        self.members.insert(index as u64, Member { at, is_split, number: u32::MAX });
+        self.fresh[usize::from(is_split)].push(index as u64);
     }
 
     /// Adds a diamond that may split and is not there yet.
     fn add_if_ready(&mut self, measured: &Measured, from: &Viewpoint, at: Option<Place>) {
         let Some((at, index)) = at.and_then(|at| Some((at, measured.lattice.index(at)?))) else { return };
-        let is_new = !self.splits.contains(index) && !self.members.contains_key(&(index as u32));
-        if is_new && from.reach.matters(measured.error(index)) && self.splits.is_ready(measured, at) {
+        let is_new = !self.splits.contains(index) && !self.members.contains_key(&(index as u64));
+        if is_new && measured.matters(&from.reach, index) && self.splits.is_ready(measured, at) {
             self.add(at, index, false);
         }
     }
 
     fn remove(&mut self, index: usize) {
-        if self.members.remove(&(index as u32)).is_some() {
-            self.watch.left(index as u32, &mut self.tickets);
+        if self.members.remove(&(index as u64)).is_some() {
+            self.watch.left(index as u64, &mut self.tickets);
         }
     }
 
@@ -227,7 +227,7 @@ impl<W: Watch> Follower<W> {
     }
 
     fn look_after(&mut self, measured: &Measured, from: &Viewpoint, known: &Known, is_split: bool, slack: f64) {
-        let ticket = Ticket { index: known.index as u32, number: self.next_number };
+        let ticket = Ticket { index: known.index as u64, number: self.next_number };
         self.next_number = (self.next_number + 1) % u32::MAX;
         self.members.get_mut(&ticket.index).expect("a member").number = ticket.number;
         if slack.is_finite() {
@@ -251,7 +251,7 @@ impl<W: Watch> Follower<W> {
         measured.lattice.children(at).for_each(|(_, child)| self.remove(child));
         self.add_if_ready(measured, from, Some(at));
         for (at, parent) in measured.lattice.parents(at) {
-            if !self.splits.is_needed(measured, at) && !self.members.contains_key(&(parent as u32)) {
+            if !self.splits.is_needed(measured, at) && !self.members.contains_key(&(parent as u64)) {
                 self.add(at, parent, true);
             }
         }

@@ -40,7 +40,7 @@ impl Diamond {
 }
 
 /// Half the length of a diamond along the axes, samples: the lowest set bit of its middle's coordinates.
-fn half_length([x, z]: Place) -> i32 {
+pub fn half_length([x, z]: Place) -> i32 {
     let both = x | z;
     both & both.wrapping_neg()
 }

@@ -11,13 +11,15 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::evaluated::{Evaluated, Size};
 use super::lattice::{Diamond, Lattice, Place};
+use super::reach::Reach;
 use crate::height::Field;
 use crate::height::bounds::ROUNDING;
 use crate::height::surface::{self, Corner};
 
 /// What rounding may take from a ball, relative: far more than that of a distance in f64.
-const SPARE: f64 = 1e-6;
+pub const SPARE: f64 = 1e-6;
 
 /// A field with its diamonds measured.
 pub struct Measured {
@@ -33,6 +35,8 @@ pub struct Measured {
     band: f32,
     /// What rounding may add to the error of vertices on their way, metres.
     rounding: f32,
+    /// In place of errors and balls where there are no samples to measure.
+    evaluated: Option<Evaluated>,
 }
 
 /// A diamond with what is known of it.
@@ -56,10 +60,16 @@ impl Measured {
     /// what they hang on is there in full.
     pub fn new(field: Arc<Field>, band: f32) -> Self {
         let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
+        if let Some(land) = field.land() {
+            let evaluated = Some(Evaluated::new(Arc::clone(land)));
+            let (errors, balls) = (Vec::new(), Vec::new());
+            return Self { errors, balls, field, lattice, band, rounding: 0.0, evaluated };
+        }
         let range = field.statistics();
         let rounding = if band > 1.0 { range.min.abs().max(range.max.abs()) * ROUNDING } else { 0.0 };
         let nothing = || vec![0.0; lattice.size()];
-        let mut measured = Self { errors: nothing(), balls: nothing(), field, lattice, band, rounding };
+        let mut measured =
+            Self { errors: nothing(), balls: nothing(), field, lattice, band, rounding, evaluated: None };
         for level in 0..measured.lattice.levels() {
             // Sides before cells: a cell's children are in its sides.
             measured.measure_level(level, |i, j| (i ^ j) & 1 == 1);
@@ -119,6 +129,9 @@ impl Measured {
     /// Height of a vertex, metres.
     #[inline]
     pub fn height(&self, at: Place) -> f32 {
+        if let (Some(evaluated), Some(index)) = (&self.evaluated, self.lattice.index(at)) {
+            return evaluated.size(at, index).height as f32;
+        }
         let [x, z] = self.lattice.on_field(at);
         self.field.height(x as u32, z as u32)
     }
@@ -139,18 +152,37 @@ impl Measured {
     /// What is known of a diamond.
     #[inline]
     pub fn known(&self, at: Place, index: usize) -> Known {
+        if let Some(evaluated) = &self.evaluated {
+            let Size { height, error, ball } = evaluated.size(at, index);
+            let [x, z] = [0, 1].map(|k| f64::from(at[k]) * self.field.spacing[k]);
+            return Known { at, index, centre: DVec3::new(x, height, z), error, ball };
+        }
         Known { at, index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
     }
 
-    /// The largest error of an unsplit diamond, metres.
+    /// Whether a diamond may have a sphere. What is not worked out yet may.
     #[inline]
-    pub fn error(&self, index: usize) -> f32 {
-        self.errors[index]
+    pub fn matters(&self, reach: &Reach, index: usize) -> bool {
+        self.is_endless() || reach.matters(self.errors[index])
+    }
+
+    /// Whether there are too many diamonds to keep something of each.
+    #[inline]
+    pub fn is_endless(&self) -> bool {
+        self.evaluated.is_some()
+    }
+
+    /// Says which diamonds will be asked for.
+    pub fn look_ahead(&self, diamonds: &[(Place, usize)]) {
+        if let Some(evaluated) = &self.evaluated {
+            evaluated.look_ahead(diamonds);
+        }
     }
 
     /// Bytes of errors and balls.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.errors.as_slice()) + size_of_val(self.balls.as_slice())
+        let evaluated = self.evaluated.as_ref().map_or(0, |evaluated| evaluated.kept() * size_of::<(u64, Size)>());
+        size_of_val(self.errors.as_slice()) + size_of_val(self.balls.as_slice()) + evaluated
     }
 }
 

@@ -17,8 +17,9 @@ use crate::draw::{Draw, DrawList, ExplicitVertex, Instance, Source, Topology};
 
 /// A corner of a wedge on its way.
 #[derive(Clone, Copy, Debug, Default)]
-struct Corner {
-    at: Place,
+pub struct Corner {
+    /// On the lattice.
+    pub at: Place,
     /// Of the sample, metres.
     height: f64,
     /// Middle of the hypotenuse as drawn, metres.
@@ -34,7 +35,8 @@ impl Corner {
         self.target + (1.0 - f64::from(self.weight)) * self.over
     }
 
-    fn vertex(&self, lattice: &Lattice) -> ExplicitVertex {
+    /// As it is drawn.
+    pub fn vertex(&self, lattice: &Lattice) -> ExplicitVertex {
         let height = if self.over + self.target == self.height { self.height } else { self.target + self.over };
         ExplicitVertex {
             position: lattice.on_field(self.at),
@@ -47,13 +49,15 @@ impl Corner {
 }
 
 /// A wedge: the corner with the right angle first, counter-clockwise seen from above.
-type Wedge = [Corner; 3];
+pub type Wedge = [Corner; 3];
 
 /// The triangles of one draw.
 #[derive(Default)]
-struct Piece {
-    vertices: Vec<ExplicitVertex>,
-    indices: Vec<u32>,
+pub struct Piece {
+    /// Vertices.
+    pub vertices: Vec<ExplicitVertex>,
+    /// Three a triangle.
+    pub indices: Vec<u32>,
 }
 
 /// A viewpoint's mesh to be made.
@@ -83,7 +87,8 @@ impl Mesh<'_> {
         pieces.into_iter().for_each(|piece| push(list, piece));
     }
 
-    fn roots(&self) -> [Wedge; 2] {
+    /// The two halves of the root square.
+    pub fn roots(&self) -> [Wedge; 2] {
         let side = self.measured.lattice.side();
         let [a, b, c, d] = [[0, 0], [side, 0], [0, side], [side, side]].map(|at| self.sample(at));
         // Seen from above with z to the south: the diagonal goes from the first corner to the last.
@@ -108,7 +113,7 @@ impl Mesh<'_> {
     }
 
     /// The two halves of a wedge, if it has split.
-    fn halves(&self, [apex, left, right]: &Wedge) -> Option<[Wedge; 2]> {
+    pub fn halves(&self, [apex, left, right]: &Wedge) -> Option<[Wedge; 2]> {
         let sum = [0, 1].map(|k| left.at[k] + right.at[k]);
         if (sum[0] | sum[1]) & 1 == 1 {
             // A cell's half.
@@ -193,7 +198,8 @@ impl Mesh<'_> {
     }
 }
 
-fn push(list: &mut DrawList, piece: Piece) {
+/// Adds a draw of a piece, if it has triangles.
+pub fn push(list: &mut DrawList, piece: Piece) {
     if piece.indices.is_empty() {
         return;
     }

@@ -22,10 +22,12 @@
 
 pub mod blocks;
 pub mod covers;
+pub mod evaluated;
 pub mod front;
 pub mod lattice;
 pub mod measure;
 pub mod mesh;
+pub mod open;
 pub mod reach;
 pub mod roam;
 pub mod shells;
@@ -43,7 +45,7 @@ use self::roam::Queues;
 use self::shells::Shells;
 use self::splits::{Found, Splits};
 use super::{Entry, Setting, Settings, Technique, Values};
-use crate::draw::{DrawList, Geometry, Limits};
+use crate::draw::{DrawList, Geometry, Limits, Manner, Normals};
 use crate::height::Field;
 use crate::view::View;
 
@@ -53,6 +55,8 @@ const BAND: f32 = 1.3;
 const HOLD: f64 = 1.1;
 /// The most diamonds that split, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
 const MOST_SPLITS: usize = 1 << 20;
+/// The same of a land without end, whose diamonds are worked out as they are met.
+const MOST_OPEN_SPLITS: usize = 1 << 17;
 /// What the tolerance is multiplied by until a frame fits.
 const WIDENING: f64 = 1.5;
 
@@ -83,6 +87,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: 1 << 27,
+    takes_endless: true,
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
 };
 
@@ -154,9 +159,15 @@ impl SphereTree {
 /// three each.
 fn limits(measured: &Measured, blocks: &Blocks) -> Limits {
     let [w, h] = measured.field.size().map(|n| n as usize);
-    let triangles = (2 * (w - 1) * (h - 1)).min(2 * MOST_SPLITS + 2);
+    let triangles = (2 * (w - 1) * (h - 1)).min(2 * most_splits(measured) + 2);
     let draws = blocks.number() + 1;
-    Limits { draws, instances: draws, vertices: triangles + 8 * draws, indices: 3 * triangles, upload_bytes: 0 }
+    let vertices = triangles + 8 * draws;
+    let normals = if measured.is_endless() { vertices } else { 0 };
+    Limits { draws, instances: draws, vertices, normals, indices: 3 * triangles, upload_bytes: 0 }
+}
+
+fn most_splits(measured: &Measured) -> usize {
+    if measured.is_endless() { MOST_OPEN_SPLITS } else { MOST_SPLITS }
 }
 
 impl Technique for SphereTree {
@@ -173,7 +184,7 @@ impl Technique for SphereTree {
         let from = loop {
             let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&wider));
             let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
-            if self.criterion.follow(&self.measured, &from, MOST_SPLITS) {
+            if self.criterion.follow(&self.measured, &from, most_splits(&self.measured)) {
                 break from;
             }
             wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
@@ -183,11 +194,20 @@ impl Technique for SphereTree {
         }
         self.blocks.look(view);
         let Self { measured, blocks, criterion, .. } = self;
-        Mesh { measured, splits: criterion.splits(), blocks, from: &from }.fill(list);
+        let mesh = Mesh { measured, splits: criterion.splits(), blocks, from: &from };
+        match measured.field.land() {
+            Some(land) => mesh.fill_open(land, view, list),
+            None => mesh.fill(list),
+        }
     }
 
     fn keeps_tolerance(&self) -> bool {
         true
+    }
+
+    fn manner(&self) -> Manner {
+        let normals = if self.measured.is_endless() { Normals::Vertices } else { Normals::Texture };
+        Manner { normals, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -1,5 +1,6 @@
 //! The diamonds that have split, and the plain way to find them: look at every one again.
 
+use super::front::ByIndex;
 use super::lattice::Place;
 use super::measure::Measured;
 use super::reach::Viewpoint;
@@ -7,9 +8,55 @@ use super::reach::Viewpoint;
 /// A set of split diamonds: none without its parents.
 #[derive(Clone, Debug, Default)]
 pub struct Splits {
-    /// One bit a diamond, by index.
-    words: Vec<u64>,
+    words: Words,
     count: usize,
+}
+
+/// One bit a diamond, by index.
+#[derive(Clone, Debug)]
+enum Words {
+    /// Of all diamonds.
+    All(Vec<u64>),
+    /// Of a tree too deep for that: those that are not 0.
+    Some(ByIndex<u64>),
+}
+
+impl Default for Words {
+    fn default() -> Self {
+        Words::All(Vec::new())
+    }
+}
+
+impl Words {
+    fn none(measured: &Measured) -> Self {
+        if measured.is_endless() {
+            Words::Some(ByIndex::default())
+        } else {
+            Words::All(vec![0; measured.lattice.size().div_ceil(64)])
+        }
+    }
+
+    #[inline]
+    fn get(&self, k: usize) -> u64 {
+        match self {
+            Words::All(words) => words[k],
+            Words::Some(words) => words.get(&(k as u64)).copied().unwrap_or(0),
+        }
+    }
+
+    #[inline]
+    fn flip(&mut self, k: usize, bit: u64) {
+        match self {
+            Words::All(words) => words[k] ^= bit,
+            Words::Some(words) => {
+                let word = words.entry(k as u64).or_default();
+                *word ^= bit;
+                if *word == 0 {
+                    words.remove(&(k as u64));
+                }
+            }
+        }
+    }
 }
 
 /// What a pass over all diamonds found.
@@ -26,19 +73,25 @@ pub struct Found {
 impl Splits {
     /// No split diamond.
     pub fn none(measured: &Measured) -> Self {
-        Self { words: vec![0; measured.lattice.size().div_ceil(64)], count: 0 }
+        Self { words: Words::none(measured), count: 0 }
     }
 
     fn clear(&mut self, measured: &Measured) {
-        self.words.clear();
-        self.words.resize(measured.lattice.size().div_ceil(64), 0);
+        match &mut self.words {
+            Words::All(words) if !measured.is_endless() => {
+                words.clear();
+                words.resize(measured.lattice.size().div_ceil(64), 0);
+            }
+            Words::Some(words) => words.clear(),
+            words => *words = Words::none(measured),
+        }
         self.count = 0;
     }
 
     /// Whether a diamond has split, by index.
     #[inline]
     pub fn contains(&self, index: usize) -> bool {
-        self.words[index / 64] >> (index % 64) & 1 != 0
+        self.words.get(index / 64) >> (index % 64) & 1 != 0
     }
 
     /// How many have.
@@ -49,14 +102,14 @@ impl Splits {
     /// Adds one that has not.
     pub(super) fn insert(&mut self, index: usize) {
         debug_assert!(!self.contains(index));
-        self.words[index / 64] |= 1 << (index % 64);
+        self.words.flip(index / 64, 1 << (index % 64));
         self.count += 1;
     }
 
     /// Removes one.
     pub(super) fn remove(&mut self, index: usize) {
         debug_assert!(self.contains(index));
-        self.words[index / 64] &= !(1 << (index % 64));
+        self.words.flip(index / 64, 1 << (index % 64));
         self.count -= 1;
     }
 
@@ -79,25 +132,28 @@ impl Splits {
         found.visited = 0;
         let mut open: Vec<_> =
             measured.lattice.root().and_then(|at| Some((at, measured.lattice.index(at)?))).into_iter().collect();
-        while let Some((at, index)) = open.pop() {
-            found.visited += 1;
-            let known = measured.known(at, index);
-            let was_split = from.hold > 1.0 && found.before.contains(index);
-            let slack = from.slack(&known, was_split);
-            if (slack > 0.0) != was_split {
-                continue;
+        while !open.is_empty() {
+            // Level by level, so that what is not known yet is worked out side by side.
+            measured.look_ahead(&open);
+            for (at, index) in std::mem::take(&mut open) {
+                found.visited += 1;
+                let known = measured.known(at, index);
+                let was_split = from.hold > 1.0 && found.before.contains(index);
+                let slack = from.slack(&known, was_split);
+                if (slack > 0.0) != was_split {
+                    continue;
+                }
+                if self.count == most {
+                    return false;
+                }
+                self.insert(index);
+                found.split.push((at, index));
+                // The last of its parents to split opens a diamond.
+                let children = measured.lattice.children(at);
+                open.extend(
+                    children.filter(|&(at, child)| measured.matters(&from.reach, child) && self.is_ready(measured, at)),
+                );
             }
-            if self.count == most {
-                return false;
-            }
-            self.insert(index);
-            found.split.push((at, index));
-            // The last of its parents to split opens a diamond.
-            let children = measured.lattice.children(at);
-            open.extend(
-                children
-                    .filter(|&(at, child)| from.reach.matters(measured.error(child)) && self.is_ready(measured, at)),
-            );
         }
         true
     }

@@ -1,0 +1,39 @@
+//! The terrain named `endless`: a land that no samples are kept of.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Result, anyhow, bail};
+
+use crate::height::bezier::{Bezier, LAYERS};
+use crate::height::{Field, Loaded, Options};
+
+/// The land called `endless` or `endless:SEED`, unless a file has that name.
+pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
+    let rest = terrain.strip_prefix("endless").filter(|_| !Path::new(terrain).exists())?;
+    let seed = match rest.strip_prefix(':') {
+        None if rest.is_empty() => Ok(1),
+        None => return None,
+        Some(seed) => seed.parse().map_err(|_| anyhow!("{terrain}: seed: expected a number of 0 or more")),
+    };
+    Some(seed.and_then(|seed| land(terrain, seed, options)))
+}
+
+/// It is not read from a file, and nothing can be said about how.
+fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
+    let Options { max_samples, hole_fill, .. } = *options;
+    if *options != (Options { max_samples, hole_fill, ..Options::default() }) {
+        bail!("{terrain}: it is worked out as it is looked at: it has no samples to space, scale, crop or repeat");
+    }
+    let field = Field::endless(Arc::new(Bezier::new(seed, LAYERS)));
+    let sample_type = "f32".to_string();
+    Ok(Loaded { field, format: "endless", sample_type, exact_in_16_bit: false, warnings: Vec::new() })
+}
+
+/// Refuses a land without samples for what looks at every sample.
+pub fn need_samples(field: &Field, what: &str) -> Result<()> {
+    if field.land().is_some() {
+        bail!("{what}: it looks at every sample, and this land has none");
+    }
+    Ok(())
+}

@@ -1,0 +1,245 @@
+//! Land without samples: an array of Bézier patches with layers of displacement, evaluated wherever it is asked for,
+//! with bounds for every part of it.
+//!
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §1.1: "a two-dimensional array of Bezier patches,
+//! on which are layered procedurally-generated displacement maps". Here each layer is itself an array of bicubic
+//! patches, half as wide as those of the layer before ([`layer`]), so that one rule bounds them all: a patch lies
+//! within the hull of its control points, and so do its derivatives within that of theirs (G. Farin, "Curves and
+//! Surfaces for CAGD", §4 and §5). How rough the land is changes slowly from place to place.
+//!
+//! Bounds of a part are within those of what holds it. Heights are the same on every machine: + − × ÷ and floor of f64.
+
+pub mod layer;
+
+use self::layer::{Layer, Ranges};
+
+/// Side of the land that is drawn, metres.
+pub const SIDE_M: f64 = 524_288.0;
+/// Distance of the places at which it is drawn at most, metres, and how many there are along a side.
+pub const SPACING_M: f64 = 1.0 / 1024.0;
+/// See [`SPACING_M`].
+pub const LATTICE: u32 = (1 << 29) + 1;
+/// Layers whose patches are 2 places wide or more.
+pub const LAYERS: u32 = 24;
+/// Width of the large patches, and heights of their control points, metres.
+const PATCH_M: f64 = 65_536.0;
+const RELIEF_M: [f64; 2] = [0.0, 3600.0];
+/// Width of the patches of the first displacement layer and heights of their control points, ±, metres.
+const FIRST_M: f64 = 16_384.0;
+const FIRST_HEIGHT_M: f64 = 1500.0;
+/// Heights of a layer over those of the one before, whose patches are twice as wide: slopes hardly fade.
+const GAIN: f64 = 0.48;
+/// Roughness, which displacement is multiplied by, and the width of its patches.
+const ROUGHNESS: [f64; 2] = [0.02, 1.0];
+const ROUGHNESS_M: f64 = 131_072.0;
+
+/// The most layers of displacement: positions in f64 tell the patches of further ones no more apart.
+pub const MOST_LAYERS: u32 = 40;
+
+/// A square part of the plane, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    /// Smallest corner.
+    pub min: [f64; 2],
+    /// Largest corner.
+    pub max: [f64; 2],
+}
+
+/// The land.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bezier {
+    patches: Layer,
+    roughness: Layer,
+    displacement: Vec<Layer>,
+}
+
+/// Bounds of the land over an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Lowest and highest, metres.
+    pub height_m: [f64; 2],
+    /// The furthest that the land is from any triangle over the area whose corners lie on it and whose longest side is
+    /// the one asked for, and its largest angle right, metres.
+    pub deviation_m: f64,
+    /// The most by which heights change along a way in the area of steps, each shorter than the one before by √2, the
+    /// first one that longest side over √8, metres.
+    pub way_m: f64,
+}
+
+impl Bezier {
+    /// Land of a seed with so many layers of displacement, the last 2^(1 − layers) times as wide as the first.
+    pub fn new(seed: u64, layers: u32) -> Self {
+        let layer = |k: u32| {
+            let (width_m, height_m) = (FIRST_M * 0.5f64.powi(k as i32), FIRST_HEIGHT_M * GAIN.powi(k as i32));
+            Layer::new(seed.wrapping_add(2 + u64::from(k)), width_m, [-height_m, height_m])
+        };
+        Self {
+            patches: Layer::new(seed, PATCH_M, RELIEF_M),
+            roughness: Layer::new(seed.wrapping_add(1), ROUGHNESS_M, ROUGHNESS),
+            displacement: (0..layers.min(MOST_LAYERS)).map(layer).collect(),
+        }
+    }
+
+    /// Height at a place, metres.
+    pub fn height(&self, at: [f64; 2]) -> f64 {
+        let displacement: f64 = self.displacement.iter().map(|layer| layer.value(at)).sum();
+        self.patches.value(at) + self.roughness.value(at) * displacement
+    }
+
+    /// Slopes (x, z) at a place, of the layers whose patches are at least so wide: what is narrower than a pixel only
+    /// glitters.
+    pub fn slopes(&self, at: [f64; 2], width_m: f64) -> [f64; 2] {
+        let (base, rough) = (self.patches.slopes(at), self.roughness.slopes(at));
+        let roughness = self.roughness.value(at);
+        let wide = || self.displacement.iter().filter(|layer| layer.width_m() >= width_m);
+        let displacement: f64 = wide().map(|layer| layer.value(at)).sum();
+        let displaced = wide().map(|layer| layer.slopes(at)).fold([0.0; 2], |sum, s| [sum[0] + s[0], sum[1] + s[1]]);
+        [0, 1].map(|k| base[k] + rough[k] * displacement + roughness * displaced[k])
+    }
+
+    /// Bounds over an area, for triangles with this longest side.
+    pub fn bounds(&self, area: &Area, longest_m: f64) -> Bounds {
+        let (base, rough) = (self.patches.ranges(area), self.roughness.ranges(area));
+        let mut bounds =
+            Bounds { height_m: base.value, deviation_m: deviation(&base, longest_m), way_m: way(&base, longest_m) };
+        for layer in &self.displacement {
+            let product = product(&rough, &layer.ranges(area));
+            bounds.height_m = [0, 1].map(|k| bounds.height_m[k] + product.value[k]);
+            bounds.deviation_m += deviation(&product, longest_m);
+            bounds.way_m += way(&product, longest_m);
+        }
+        bounds
+    }
+
+    /// Lowest and highest of all, metres.
+    pub fn range_m(&self) -> [f64; 2] {
+        let most: f64 = self.displacement.iter().map(|layer| layer.ends()[1] * ROUGHNESS[1]).sum();
+        [RELIEF_M[0] - most, RELIEF_M[1] + most]
+    }
+}
+
+impl Area {
+    /// The square about a place, up to a distance along the axes, metres.
+    pub fn about(at: [f64; 2], reach_m: f64) -> Self {
+        Self { min: at.map(|n| n - reach_m), max: at.map(|n| n + reach_m) }
+    }
+}
+
+/// How far a function is from its linear interpolation at the corners of a triangle whose longest side is its
+/// circumcircle's diameter: its largest second derivative times R²/2 (S. Waldron, "The error in linear interpolation at
+/// the vertices of a simplex", 1998); and never more than the width of its range.
+fn deviation(ranges: &Ranges, longest_m: f64) -> f64 {
+    (ranges.bend * longest_m * longest_m / 8.0).min(ranges.width())
+}
+
+/// See [`Bounds::way_m`]: a step changes a function by its largest slope, and no more than its range is wide.
+fn way(ranges: &Ranges, longest_m: f64) -> f64 {
+    let (mut way, mut step) = (0.0, longest_m / 8f64.sqrt());
+    while ranges.slope * step > ranges.width() {
+        (way, step) = (way + ranges.width(), step * 0.5f64.sqrt());
+    }
+    way + ranges.slope * step / (1.0 - 0.5f64.sqrt())
+}
+
+/// Ranges of a product: derivatives by the product rule, from the largest absolute values.
+fn product(a: &Ranges, b: &Ranges) -> Ranges {
+    let ends = [a.value[0] * b.value[0], a.value[0] * b.value[1], a.value[1] * b.value[0], a.value[1] * b.value[1]];
+    let largest = |[low, high]: [f64; 2]| low.abs().max(high.abs());
+    let (of_a, of_b) = (largest(a.value), largest(b.value));
+    Ranges {
+        value: [ends.into_iter().fold(f64::INFINITY, f64::min), ends.into_iter().fold(f64::NEG_INFINITY, f64::max)],
+        slope: a.slope * of_b + of_a * b.slope,
+        bend: a.bend * of_b + 2.0 * a.slope * b.slope + of_a * b.bend,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place(dice: &mut fastrand::Rng) -> [f64; 2] {
+        [dice.f64() * SIDE_M, dice.f64() * SIDE_M]
+    }
+
+    /// A right isosceles triangle in an area: its right angle and the ends of its longest side.
+    fn triangle(at: [f64; 2], side_m: f64, turned: bool) -> [[f64; 2]; 3] {
+        let [x, z] = at;
+        if turned {
+            [[x, z], [x + side_m, z + side_m], [x - side_m, z + side_m]]
+        } else {
+            [[x, z], [x + side_m, z], [x, z + side_m]]
+        }
+    }
+
+    /// From wedges of the whole land to those that f64 can hardly tell apart: points sown densely over triangles never
+    /// lie beyond the bounds, which are no trivial ones.
+    #[test]
+    fn nothing_lies_beyond_its_bounds_at_any_depth() {
+        let (land, mut dice) = (Bezier::new(5, MOST_LAYERS), fastrand::Rng::with_seed(1));
+        for depth in (0..=46).step_by(2) {
+            let side_m = SIDE_M / 2f64.powi(depth + 1);
+            let (mut tightness, mut worst) = (Vec::new(), 0.0f64);
+            for k in 0..60 {
+                let corners = triangle(place(&mut dice), side_m, k % 2 == 0);
+                let longest_m = side_m * if k % 2 == 0 { 2.0 } else { 2f64.sqrt() };
+                let area = Area {
+                    min: [0, 1].map(|k| corners.iter().map(|c| c[k]).fold(f64::INFINITY, f64::min)),
+                    max: [0, 1].map(|k| corners.iter().map(|c| c[k]).fold(f64::NEG_INFINITY, f64::max)),
+                };
+                let (bounds, heights) = (land.bounds(&area, longest_m), corners.map(|c| land.height(c)));
+                let mut furthest = 0.0f64;
+                for _ in 0..200 {
+                    let (mut u, mut v) = (dice.f64(), dice.f64());
+                    if u + v > 1.0 {
+                        (u, v) = (1.0 - u, 1.0 - v);
+                    }
+                    let mix = |[a, b, c]: [f64; 3]| a + u * (b - a) + v * (c - a);
+                    let at = [0, 1].map(|k| mix(corners.map(|c| c[k])));
+                    let height = land.height(at);
+                    // Rounding: of the sum of the layers, and of the place where it is steep.
+                    assert!(height >= bounds.height_m[0] - 1e-9 && height <= bounds.height_m[1] + 1e-9);
+                    furthest = furthest.max((height - mix(heights)).abs() - 1e-9);
+                }
+                assert!(furthest <= bounds.deviation_m, "depth {depth}: {furthest} m of {bounds:?}");
+                worst = worst.max(furthest / bounds.deviation_m);
+                tightness.push(bounds.deviation_m / furthest.max(1e-9));
+            }
+            tightness.sort_by(f64::total_cmp);
+            println!("{side_m:.1e} m: the bound is {:.1} times what is found", tightness[tightness.len() / 2]);
+            // Below a micrometre rounding hides what is found.
+            assert!(worst > 0.1 || side_m < 1e-4, "depth {depth}: {worst} of the bound at most");
+        }
+    }
+
+    #[test]
+    fn bounds_of_a_part_are_within_those_of_the_whole() {
+        let (land, mut dice) = (Bezier::new(9, 30), fastrand::Rng::with_seed(2));
+        for _ in 0..2000 {
+            let reach_m = SIDE_M * 0.5f64.powi(dice.i32(1..40));
+            let (at, part) = (place(&mut dice), dice.f64());
+            let shift = |dice: &mut fastrand::Rng| (2.0 * dice.f64() - 1.0) * reach_m * (1.0 - part);
+            let inner = [at[0] + shift(&mut dice), at[1] + shift(&mut dice)];
+            let whole = land.bounds(&Area::about(at, reach_m), reach_m);
+            let bounds = land.bounds(&Area::about(inner, reach_m * part), reach_m * dice.f64());
+            assert!(bounds.deviation_m <= whole.deviation_m * (1.0 + 1e-12), "{bounds:?} in {whole:?}");
+            let spare = 1e-9;
+            assert!(bounds.height_m[0] >= whole.height_m[0] - spare && bounds.height_m[1] <= whole.height_m[1] + spare);
+            assert!(whole.height_m[0] >= land.range_m()[0] - spare && whole.height_m[1] <= land.range_m()[1] + spare);
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_heights() {
+        let (land, mut dice) = (Bezier::new(3, 12), fastrand::Rng::with_seed(3));
+        for _ in 0..300 {
+            let at = place(&mut dice);
+            let slopes = land.slopes(at, 0.0);
+            let step = 1e-3;
+            let rise = [[step, 0.0], [0.0, step]]
+                .map(|[x, z]| land.height([at[0] + x, at[1] + z]) - land.height([at[0] - x, at[1] - z]));
+            for k in 0..2 {
+                assert!((slopes[k] - rise[k] / (2.0 * step)).abs() < 1e-5, "{slopes:?}, {rise:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! What is known of the diamonds of a land without samples: worked out when first asked for, from its bounds over all
+//! that hangs on a diamond, and kept for as long as there is room.
+//!
+//! Nested as the measured ones are ([`measure`](super::measure)), and without a look at what lies below. All descendants
+//! of a diamond of half length h lie within 3 h of its middle along the axes if it is a cell's, 2 h if a side's. Bounds
+//! of a part are within those of the whole, so errors are nested. From parent to child middles are a step apart, h from
+//! a cell's and h/√2 from a side's, and steps shrink by √2: the length of all steps to come, and the most that heights
+//! change along them ([`Bounds::way_m`](crate::height::bezier::Bounds)), is a ball that holds the children's.
+
+use std::sync::{Arc, PoisonError, RwLock};
+
+use rayon::prelude::*;
+
+use super::front::ByIndex;
+use super::lattice::{Place, half_length};
+use super::measure::SPARE;
+use crate::height::bezier::{Area, Bezier, SPACING_M};
+use crate::height::bounds::ROUNDING;
+
+/// What is kept is in so many parts, so that few wait for each other, each of at most so many diamonds.
+const PARTS: usize = 64;
+const MOST_KEPT: usize = 1 << 15;
+
+/// A diamond's sizes, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Height of its middle.
+    pub height: f64,
+    /// The largest distance of its triangles, unsplit, and of all below, from the land.
+    pub error: f32,
+    /// The ball about its middle that holds the land on which all below it lies, and the balls of all below.
+    pub ball: f32,
+}
+
+/// Sizes of diamonds of a land.
+pub struct Evaluated {
+    land: Arc<Bezier>,
+    /// What rounding of vertices to single precision may add to an error, metres.
+    rounding: f64,
+    parts: Vec<RwLock<ByIndex<Size>>>,
+}
+
+impl Evaluated {
+    /// Of a land.
+    pub fn new(land: Arc<Bezier>) -> Self {
+        let [low, high] = land.range_m();
+        let rounding = low.abs().max(high.abs()) * f64::from(ROUNDING);
+        Self { land, rounding, parts: (0..PARTS).map(|_| RwLock::default()).collect() }
+    }
+
+    fn part(&self, index: usize) -> &RwLock<ByIndex<Size>> {
+        &self.parts[(index ^ index >> 20) % PARTS]
+    }
+
+    /// The sizes of a diamond.
+    pub fn size(&self, at: Place, index: usize) -> Size {
+        let part = self.part(index);
+        if let Some(size) = part.read().unwrap_or_else(PoisonError::into_inner).get(&(index as u64)) {
+            return *size;
+        }
+        let size = self.work_out(at);
+        let mut part = part.write().unwrap_or_else(PoisonError::into_inner);
+        if part.len() == MOST_KEPT {
+            part.clear();
+        }
+        part.insert(index as u64, size);
+        size
+    }
+
+    /// Works out side by side what is not known yet.
+    pub fn look_ahead(&self, diamonds: &[(Place, usize)]) {
+        diamonds.par_iter().with_min_len(16).for_each(|&(at, index)| {
+            self.size(at, index);
+        });
+    }
+
+    /// How many are kept.
+    pub fn kept(&self) -> usize {
+        self.parts.iter().map(|part| part.read().unwrap_or_else(PoisonError::into_inner).len()).sum()
+    }
+
+    fn work_out(&self, at: Place) -> Size {
+        let half = half_length(at);
+        let is_cell = at.iter().all(|n| n & half != 0);
+        let half_m = f64::from(half) * SPACING_M;
+        let (reach, longest_m) = if is_cell { (3.0, 8f64.sqrt() * half_m) } else { (2.0, 2.0 * half_m) };
+        let place = at.map(|n| f64::from(n) * SPACING_M);
+        let bounds = self.land.bounds(&Area::about(place, reach * half_m), longest_m);
+        let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
+        let ball = (steps_m + bounds.way_m) * f64::from(1.0 + SPARE);
+        Size {
+            height: self.land.height(place),
+            error: ((bounds.deviation_m + self.rounding) as f32).next_up(),
+            ball: (ball as f32).next_up(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::bezier::LATTICE;
+    use crate::lod::sphere_tree::lattice::{Diamond, Lattice};
+
+    fn random_place(dice: &mut fastrand::Rng, level: u32) -> Place {
+        loop {
+            let at = [0, 1].map(|_| dice.i32(1..(1 << (29 - level))) << level);
+            if half_length(at) == 1 << level {
+                return at;
+            }
+        }
+    }
+
+    /// From the root to the last places, down random ways.
+    #[test]
+    fn errors_and_balls_are_nested_at_every_depth() {
+        let evaluated = Evaluated::new(Arc::new(Bezier::new(7, 24)));
+        let (lattice, mut dice) = (Lattice::new([LATTICE as i32 - 1; 2]), fastrand::Rng::with_seed(4));
+        let spot = |at: Place, size: &Size| {
+            glam::DVec3::new(f64::from(at[0]) * SPACING_M, size.height, f64::from(at[1]) * SPACING_M)
+        };
+        for level in (0..29).flat_map(|level| std::iter::repeat_n(level, 40)) {
+            let at = random_place(&mut dice, level);
+            let parent = evaluated.size(at, lattice.index(at).expect("a diamond"));
+            for (child_at, index) in lattice.children(at) {
+                let child = evaluated.size(child_at, index);
+                let reach = spot(at, &parent).distance(spot(child_at, &child)) + f64::from(child.ball);
+                assert!(reach <= f64::from(parent.ball), "{at:?}: {child:?} in {parent:?}");
+                assert!(child.error <= parent.error, "{at:?}: {child:?} in {parent:?}");
+            }
+        }
+    }
+
+    /// Points sown densely over a diamond's wedges: within the error of its triangles as they are drawn, and in its ball.
+    #[test]
+    fn the_land_is_within_a_diamond_s_error_at_every_depth() {
+        let land = Arc::new(Bezier::new(7, 24));
+        let (evaluated, mut dice) = (Evaluated::new(Arc::clone(&land)), fastrand::Rng::with_seed(6));
+        let lattice = Lattice::new([LATTICE as i32 - 1; 2]);
+        for level in 0..29 {
+            let mut worst = 0f64;
+            for _ in 0..30 {
+                let at = random_place(&mut dice, level);
+                let size = evaluated.size(at, lattice.index(at).expect("a diamond"));
+                let Diamond { ends, apexes } = Diamond::around(at);
+                let drawn = [apexes[0], ends[0], ends[1]].map(|p| {
+                    let plan = p.map(|n| f64::from(n) * SPACING_M);
+                    [plan[0], plan[1], f64::from(land.height(plan) as f32)]
+                });
+                for _ in 0..100 {
+                    let (mut u, mut v) = (dice.f64(), dice.f64());
+                    if u + v > 1.0 {
+                        (u, v) = (1.0 - u, 1.0 - v);
+                    }
+                    let [a, b, c] = drawn;
+                    let [x, z, y] = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
+                    let height = land.height([x, z]);
+                    assert!((height - y).abs() <= f64::from(size.error), "level {level}: {size:?}");
+                    let middle = at.map(|n| f64::from(n) * SPACING_M);
+                    let from_middle = (x - middle[0]).hypot(z - middle[1]).hypot(height - size.height);
+                    assert!(from_middle <= f64::from(size.ball), "level {level}: {size:?}");
+                    worst = worst.max((height - y).abs() / f64::from(size.error));
+                }
+            }
+            println!("level {level}: up to {worst:.3} of the error is found");
+            assert!(worst > 0.01, "level {level}: the error is {:.0} times what is found", 1.0 / worst);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The triangles of a land without end: no table of blocks says what is in sight, so a wedge's ball does.
+//!
+//! The balls of wedges are nested: one out of sight has nothing in sight below it, and a wider tolerance never draws
+//! more. Vertices carry normals, as there is no texture of heights to light them by.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::lattice::Place;
+use super::mesh::{Mesh, Piece, Wedge, push};
+use crate::draw::normals::pack;
+use crate::draw::{DrawList, VertexNormals};
+use crate::height::bezier::{Bezier, SPACING_M};
+use crate::view::{Lens, View};
+
+/// Slopes are those of the land without what is narrower than so many pixels: triangles are not much smaller.
+const SMOOTHED_PX: f64 = 6.0;
+
+impl Mesh<'_> {
+    /// Fills an empty list: one draw.
+    pub fn fill_open(&self, land: &Bezier, view: &View, list: &mut DrawList) {
+        let (mut piece, mut numbers) = (Piece::default(), HashMap::new());
+        for wedge in self.roots() {
+            self.walk(&wedge, view, &mut |wedge| {
+                for corner in wedge {
+                    let number = *numbers.entry(corner.at).or_insert_with(|| {
+                        piece.vertices.push(corner.vertex(&self.measured.lattice));
+                        piece.vertices.len() as u32 - 1
+                    });
+                    piece.indices.push(number);
+                }
+            });
+        }
+        let normal = |vertex: &crate::draw::ExplicitVertex| normal(land, view, vertex.position, vertex.height);
+        list.streamed.normals = piece.vertices.par_iter().with_min_len(64).map(normal).collect();
+        push(list, piece);
+    }
+
+    /// Calls `visit` for the wedges in sight that have not split.
+    fn walk(&self, wedge: &Wedge, view: &View, visit: &mut impl FnMut(&Wedge)) {
+        if !self.may_be_seen(wedge, view) {
+            return;
+        }
+        match self.halves(wedge) {
+            Some(halves) => halves.iter().for_each(|half| self.walk(half, view, visit)),
+            None => visit(wedge),
+        }
+    }
+
+    /// Whether the ball of a wedge's diamond reaches into what can be seen.
+    fn may_be_seen(&self, [_, left, right]: &Wedge, view: &View) -> bool {
+        let sum = [0, 1].map(|k| left.at[k] + right.at[k]);
+        let index = self.measured.lattice.index(sum.map(|n| n / 2)).filter(|_| (sum[0] | sum[1]) & 1 == 0);
+        let Some(index) = index else { return true };
+        let known = self.measured.known(sum.map(|n| n / 2), index);
+        let from_eye = known.centre - self.from.eye;
+        view.planes().iter().all(|(normal, offset)| normal.dot(from_eye) + offset >= -f64::from(known.ball))
+    }
+}
+
+fn normal(land: &Bezier, view: &View, at: Place, height: f32) -> VertexNormals {
+    let [x, z] = at.map(|n| f64::from(n) * SPACING_M);
+    let distance = match view.lens {
+        Lens::Perspective { .. } => view.eye.distance(DVec3::new(x, f64::from(height), z)),
+        Lens::Orthographic { .. } => 1.0,
+    };
+    let [along_x, along_z] = land.slopes([x, z], SMOOTHED_PX * distance / view.focal_px());
+    let normal = pack(DVec3::new(-along_x, 1.0, -along_z).normalize_or(DVec3::Y).as_vec3());
+    VertexNormals { normal, target: normal, further: normal }
+}

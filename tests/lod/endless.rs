@@ -1,0 +1,150 @@
+//! Spheres over a land without samples: the bound against the land itself, from space to a stone.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use cuesta::draw::DrawList;
+use cuesta::draw::expand::{self, Drawn};
+use cuesta::draw::layout::Frame;
+use cuesta::height::Field;
+use cuesta::height::bezier::{Bezier, LAYERS, SIDE_M, SPACING_M};
+use cuesta::lod::Technique;
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::{DVec2, DVec3};
+
+const TOLERANCE_PX: f64 = 2.0;
+
+fn land() -> Arc<Field> {
+    Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))))
+}
+
+/// From so far above one place, looking past it.
+fn view(field: &Field, above_m: f64, yaw: f64) -> View {
+    let at = DVec3::new(0.43, 0.0, 0.37) * SIDE_M;
+    let ground = field.height_at(at.x, at.z).expect("over the land");
+    View {
+        eye: DVec3::new(at.x, ground + above_m, at.z),
+        // From space the land is below; further down its horizon is in the picture.
+        world_from_eye: View::turned(yaw, if above_m > 1e5 { -75.0 } else { -15.0 }, 0.0),
+        lens: Lens::Perspective { fov_x: 1.0 },
+        size: [320, 200],
+        near: 0.1 * above_m.min(1.0),
+        tolerance: Tolerance { px: TOLERANCE_PX, metric: Metric::Certified },
+        time_s: 0.0,
+    }
+}
+
+fn drawn(field: &Field, room: &mut dyn Technique, view: &View) -> Vec<Drawn> {
+    let mut list = DrawList::default();
+    room.select(view, &mut list);
+    assert_eq!(list.widening, 1.0);
+    assert!(room.limits().hold(&list.size()));
+    assert_eq!(list.streamed.normals.len(), list.streamed.vertices.len());
+    expand::triangles(field, &Frame::placing(field, view), room.resident(), &list)
+}
+
+fn world(corners: &[cuesta::height::surface::Corner; 3]) -> [DVec3; 3] {
+    corners.map(|c| DVec3::new(f64::from(c.x) * SPACING_M, f64::from(c.y), f64::from(c.z) * SPACING_M))
+}
+
+/// Heights of the zoom, metres.
+fn zoom() -> impl Iterator<Item = f64> {
+    (0..13).map(|k| 4e5 * 0.3f64.powi(k))
+}
+
+#[test]
+fn the_tolerance_is_kept_against_the_land_itself_from_space_to_a_stone() {
+    let field = land();
+    let bezier = Arc::clone(field.land().expect("endless"));
+    for morph in ["morph=off", "morph=on"] {
+        let mut room = super::technique(&field, "sphere-tree", &[morph]);
+        let mut dice = fastrand::Rng::with_seed(3);
+        for above_m in zoom() {
+            let view = view(&field, above_m, 40.0);
+            let triangles = drawn(&field, &mut *room, &view);
+            let (mut worst, mut seen) = (0.0f64, 0);
+            for corners in triangles.iter().map(|t| world(&t.corners)) {
+                for _ in 0..6 {
+                    let (mut u, mut v) = (dice.f64(), dice.f64());
+                    if u + v > 1.0 {
+                        (u, v) = (1.0 - u, 1.0 - v);
+                    }
+                    let [a, b, c] = corners;
+                    let drawn = a + (b - a) * u + (c - a) * v;
+                    let truth = DVec3::new(drawn.x, bezier.height([drawn.x, drawn.z]), drawn.z);
+                    if [drawn, truth].iter().any(|&at| view.project(at).is_some_and(|at| view.in_picture(&at))) {
+                        worst = worst.max(view.displacement_px(drawn, truth));
+                        seen += 1;
+                    }
+                }
+            }
+            println!("{morph}, {above_m:9.3} m: {} triangles, {worst:.3} px at {seen} places", triangles.len());
+            assert!(worst <= TOLERANCE_PX, "{above_m} m: {worst} px");
+            assert!(worst > 0.02 * TOLERANCE_PX && seen > 500, "{above_m} m: {worst} px at {seen} places");
+        }
+    }
+}
+
+/// No vertex lies within a side of a triangle, and all land in the picture is drawn.
+#[test]
+fn the_mesh_conforms_and_covers_what_is_in_sight() {
+    let field = land();
+    let mut room = super::technique(&field, "sphere-tree", &[]);
+    let mut dice = fastrand::Rng::with_seed(5);
+    for above_m in zoom() {
+        let view = view(&field, above_m, 130.0);
+        let triangles = drawn(&field, &mut *room, &view);
+        let vertices: HashSet<[i32; 2]> = triangles.iter().flat_map(|t| t.corners.map(|c| [c.x, c.z])).collect();
+        for corners in triangles.iter().map(|t| t.corners.map(|c| [c.x, c.z])) {
+            for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
+                let sum = [0, 1].map(|k| a[k] + b[k]);
+                let is_vertex = sum.iter().all(|n| n % 2 == 0) && vertices.contains(&sum.map(|n| n / 2));
+                assert!(!is_vertex, "{above_m} m: a vertex within {a:?} to {b:?}");
+            }
+        }
+        let mut seen = 0;
+        for _ in 0..4000 {
+            // Dense about the eye, and out to the horizon.
+            let (turn, far_m) = (dice.f64() * std::f64::consts::TAU, above_m * 10f64.powf(4.0 * dice.f64() - 1.0));
+            let [x, z] = [view.eye.x + far_m * turn.cos(), view.eye.z + far_m * turn.sin()];
+            let Some(y) = field.height_at(x, z) else { continue };
+            if view.project(DVec3::new(x, y, z)).is_some_and(|at| view.in_picture(&at)) {
+                let at = DVec2::new(x, z) / SPACING_M;
+                assert!(triangles.iter().any(|t| covers(t, at)), "{above_m} m: nothing is drawn at {x}, {z}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 50, "{above_m} m: {seen} places");
+    }
+}
+
+fn covers(triangle: &Drawn, at: DVec2) -> bool {
+    let [a, b, c] = triangle.corners.map(|c| DVec2::new(f64::from(c.x), f64::from(c.z)) - at);
+    let areas = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
+    areas.iter().all(|&n| n <= 0.0) || areas.iter().all(|&n| n >= 0.0)
+}
+
+#[test]
+fn crossings_are_found_alike_and_returning_draws_the_same() {
+    let field = land();
+    let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
+    let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion]));
+    let mut dice = fastrand::Rng::with_seed(8);
+    let mut view = view(&field, 40.0, 10.0);
+    for step in 0..60 {
+        let fall = if step == 30 { 3000.0 } else { 3.0 };
+        view.eye += DVec3::new(dice.f64() - 0.5, dice.f64() - 0.5, dice.f64() - 0.5) * fall;
+        let lists = rooms.each_mut().map(|room| {
+            let mut list = DrawList::default();
+            room.select(&view, &mut list);
+            list
+        });
+        for list in &lists {
+            let bytes = |list: &DrawList| bytemuck::cast_slice::<_, u8>(&list.streamed.vertices).to_vec();
+            assert!(
+                list.streamed.indices == lists[3].streamed.indices && bytes(list) == bytes(&lists[3]),
+                "step {step}"
+            );
+        }
+    }
+}
