@@ -12,6 +12,7 @@ mod measure;
 mod profile;
 mod readme;
 mod report;
+mod stress;
 mod synth;
 mod texture;
 #[cfg(feature = "viewer")]

@@ -1,4 +1,4 @@
-//! `cuesta report`: draws the report of a benchmark again, from its rows alone.
+//! `cuesta report`: draws the report of a benchmark or of a stability battery again, from its rows alone.
 
 use std::path::PathBuf;
 
@@ -8,11 +8,12 @@ use serde::Serialize;
 
 use super::{Common, Outcome, report};
 use crate::bench::results;
+use crate::stress::rows;
 
 /// Arguments.
 #[derive(Args, Debug)]
 pub struct ReportArgs {
-    /// Directory of a benchmark.
+    /// Directory of a benchmark or of a stability battery.
     pub folder: PathBuf,
 }
 
@@ -24,6 +25,12 @@ struct Redrawn {
 
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ReportArgs) -> Result<Outcome> {
+    let battery = args.folder.join(rows::FILE);
+    if battery.exists() {
+        let report = crate::report::write_stress(&args.folder)?.display().to_string();
+        report::print(common, &Redrawn { report, results: battery.display().to_string() })?;
+        return Ok(Outcome::Done);
+    }
     let results = results::write(&args.folder)?.display().to_string();
     let report = crate::report::write(&args.folder)?.display().to_string();
     report::print(common, &Redrawn { report, results })?;

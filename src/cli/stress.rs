@@ -91,7 +91,7 @@ fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
 }
 
 fn progress(common: &Common, trials: &[Trial], draws: bool) -> ProgressBar {
-    let drawn = trials.iter().filter(|trial| draws && trial.form.is_some()).count();
+    let drawn = trials.iter().filter(|trial| draws && trial.is_drawn()).count();
     let bar = if common.quiet || common.json { ProgressBar::hidden() } else { ProgressBar::no_length() };
     bar.set_length((trials.len() + drawn) as u64);
     bar

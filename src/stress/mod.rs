@@ -139,6 +139,12 @@ impl Trial {
         }
     }
 
+    /// Whether a device draws it, if there is one: a technique with its defaults and each variant.
+    pub fn is_drawn(&self) -> bool {
+        let has_picture = matches!(self.case.kind, Kind::Land(_) | Kind::Flight(_));
+        has_picture && self.form.as_ref().is_some_and(|form| form.choices.is_empty())
+    }
+
     /// What is found without a device. A panic is a finding.
     pub fn run(&self) -> Vec<Finding> {
         let findings = catch_unwind(AssertUnwindSafe(|| match (&self.case.kind, &self.form) {
@@ -184,7 +190,7 @@ pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, progress: impl Fn(&Trial
         .collect();
     if let Some(eye) = eye {
         for (trial, findings) in trials.iter().zip(&mut found) {
-            if let Some(form) = &trial.form {
+            if let Some(form) = trial.form.as_ref().filter(|_| trial.is_drawn()) {
                 progress(trial);
                 findings.extend(eye.look(trial.case, form));
             }

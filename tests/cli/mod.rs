@@ -111,6 +111,27 @@ fn synth_writes_what_info_reads_in_every_format() {
 }
 
 #[test]
+fn stress_prints_the_contract_and_writes_a_page() {
+    let folder = folder();
+    let arguments = ["stress", "--family", "file", "--case", "odd tiles", "--no-device", "--out", "kept"];
+    let found = json(folder.path(), &arguments);
+    let cases = found["cases"].as_array().expect("rows");
+    assert!(cases.len() >= 3);
+    for field in ["family", "name", "technique", "check", "value", "limit", "pass"] {
+        assert!(cases.iter().all(|case| case.get(field).is_some()), "{field}");
+    }
+    let kept = std::fs::read_to_string(folder.path().join("kept/stress.json")).expect("rows");
+    assert_eq!(serde_json::from_str::<Value>(&kept).expect("JSON"), found);
+    let page = folder.path().join("kept/index.html");
+    std::fs::remove_file(&page).expect("a page");
+    json(folder.path(), &["report", "kept"]);
+    assert!(std::fs::read_to_string(page).expect("a page again").contains("The stability battery"));
+    refused(folder.path(), &["stress", "--family", "weather"], &["--family weather", "position", "stiff"]);
+    refused(folder.path(), &["stress", "--case", "weather"], &["--case weather"]);
+    refused(folder.path(), &["stress", "--technique", "clusters:x"], &["--technique clusters:x", "gpu-driven"]);
+}
+
+#[test]
 fn export_writes_meshes_that_others_read() {
     let folder = folder();
     synth(folder.path(), "fractal", "65x49", "a.tif");

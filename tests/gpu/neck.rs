@@ -90,6 +90,7 @@ impl Technique for Explicit {
             draws: 1000,
             instances: 1,
             vertices: self.mesh.vertices.len(),
+            normals: 0,
             indices: self.mesh.indices.len(),
             upload_bytes: bytes,
         }
