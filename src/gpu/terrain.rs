@@ -49,6 +49,8 @@ struct Slot {
     commands: Buffer,
     vertices: Buffer,
     indices: Buffer,
+    /// Width of the streamed indices: 16 bits where all of the frame's fit.
+    index_type: vk::IndexType,
     staging: Buffer,
 }
 
@@ -156,7 +158,7 @@ impl Terrain {
         slot.frame.write(0, bytemuck::bytes_of(frame));
         slot.instances.write(0, cast_slice(&list.instances));
         slot.vertices.write(0, cast_slice(&list.streamed.vertices));
-        slot.indices.write(0, cast_slice(&list.streamed.indices));
+        slot.write_indices(&list.streamed.indices);
         for (k, draw) in list.draws.iter().enumerate() {
             slot.commands.write(k * COMMAND, &command_bytes(draw));
         }
@@ -325,16 +327,17 @@ impl Terrain {
 
     pub(super) fn bind_geometry(&self, r: &Recording, source: Source) {
         let slot = &self.slots[r.slot];
-        let (vertices, indices) = match source {
-            Source::Lattice => (&self.resident.lattice, &self.resident.indices),
-            Source::Resident => (&self.resident.vertices, &self.resident.indices),
-            Source::Streamed => (&slot.vertices, &slot.indices),
+        let wide = vk::IndexType::UINT32;
+        let (vertices, indices, index_type) = match source {
+            Source::Lattice => (&self.resident.lattice, &self.resident.indices, wide),
+            Source::Resident => (&self.resident.vertices, &self.resident.indices, wide),
+            Source::Streamed => (&slot.vertices, &slot.indices, slot.index_type),
         };
         // SAFETY: the buffers live until the frame has ended.
         unsafe {
             let buffers = [vertices.raw, slot.instances.raw, self.resident.normals.raw];
             self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0; 3]);
-            self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, vk::IndexType::UINT32);
+            self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, index_type);
         }
     }
 }
@@ -403,8 +406,21 @@ impl Slot {
             commands: host("indirect commands", limits.draws * COMMAND, Usage::INDIRECT_BUFFER)?,
             vertices: host("streamed vertices", limits.vertices * size_of::<ExplicitVertex>(), Usage::VERTEX_BUFFER)?,
             indices: host("streamed indices", limits.indices * 4, Usage::INDEX_BUFFER)?,
+            index_type: vk::IndexType::UINT32,
             staging: host("upload staging", limits.upload_bytes, Usage::TRANSFER_SRC)?,
         })
+    }
+
+    /// Writes the frame's streamed indices, 16 bits each if all of them fit.
+    fn write_indices(&mut self, indices: &[u32]) {
+        let highest = indices.iter().copied().fold(0, u32::max);
+        if highest <= u32::from(u16::MAX) {
+            self.index_type = vk::IndexType::UINT16;
+            self.indices.write_short(indices);
+        } else {
+            self.index_type = vk::IndexType::UINT32;
+            self.indices.write(0, cast_slice(indices));
+        }
     }
 
     fn describe(&self, gpu: &Gpu, images: &[Image; 4], samplers: [vk::Sampler; 4]) {
