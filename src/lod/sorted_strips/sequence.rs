@@ -1,4 +1,17 @@
 //! The order in which a frame's triangles are drawn. They are made nearest first; all other orders are of the same ones.
+//!
+//! Fragments that pass the depth test per covered pixel, over 1025 × 1025 samples at 1 px, 1280 × 720 pixels, 12 frames of
+//! each path:
+//!
+//! | path | nearest first | shuffled | furthest first | brute force |
+//! |---|---|---|---|---|
+//! | circle | 1.000 | 1.387 | 2.062 | 1.547 |
+//! | skim | 1.000 | 1.496 | 2.496 | 1.234 |
+//! | corner | 1.000 | 1.100 | 1.233 | 1.000 |
+//!
+//! Triangles stay a list. Over a view of 464 711 triangles strips with restart break off after 1.97 triangles on average, as
+//! the order of sight goes to and fro: 16 % fewer indices, 18 % with repeated ones, where indices of 16 bits take half the
+//! bytes. Rows of pages count from a first vertex of their own, so that their indices fit.
 
 use crate::draw::{DrawList, Hiding};
 
