@@ -140,6 +140,16 @@ impl Buffer {
         mapped[offset..offset + data.len()].copy_from_slice(data);
     }
 
+    /// Copies indices that fit 16 bits into a host-visible buffer, 16 bits each.
+    ///
+    /// # Panics
+    /// If the buffer is not host-visible or they do not fit.
+    pub fn write_short(&mut self, indices: &[u32]) {
+        let mapped = self.memory.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).expect("host-visible");
+        let short: &mut [u16] = bytemuck::cast_slice_mut(&mut mapped[..size_of::<u16>() * indices.len()]);
+        short.iter_mut().zip(indices).for_each(|(short, index)| *short = *index as u16);
+    }
+
     /// Sets every byte of a host-visible buffer.
     ///
     /// # Panics

@@ -50,6 +50,8 @@ struct Slot {
     vertices: Buffer,
     normals: Buffer,
     indices: Buffer,
+    /// Width of the streamed indices: 16 bits where all of the frame's fit.
+    index_type: vk::IndexType,
     staging: Buffer,
 }
 
@@ -158,7 +160,7 @@ impl Terrain {
         slot.instances.write(0, cast_slice(&list.instances));
         slot.vertices.write(0, cast_slice(&list.streamed.vertices));
         slot.normals.write(0, cast_slice(&list.streamed.normals));
-        slot.indices.write(0, cast_slice(&list.streamed.indices));
+        slot.write_indices(&list.streamed.indices);
         for (k, draw) in list.draws.iter().enumerate() {
             slot.commands.write(k * COMMAND, &command_bytes(draw));
         }
@@ -327,17 +329,17 @@ impl Terrain {
 
     pub(super) fn bind_geometry(&self, r: &Recording, source: Source) {
         let slot = &self.slots[r.slot];
-        let resident = &self.resident;
-        let (vertices, normals, indices) = match source {
-            Source::Lattice => (&resident.lattice, &resident.normals, &resident.indices),
-            Source::Resident => (&resident.vertices, &resident.normals, &resident.indices),
-            Source::Streamed => (&slot.vertices, &slot.normals, &slot.indices),
+        let (resident, wide) = (&self.resident, vk::IndexType::UINT32);
+        let (vertices, normals, indices, index_type) = match source {
+            Source::Lattice => (&resident.lattice, &resident.normals, &resident.indices, wide),
+            Source::Resident => (&resident.vertices, &resident.normals, &resident.indices, wide),
+            Source::Streamed => (&slot.vertices, &slot.normals, &slot.indices, slot.index_type),
         };
         // SAFETY: the buffers live until the frame has ended.
         unsafe {
             let buffers = [vertices.raw, slot.instances.raw, normals.raw];
             self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 0, &buffers, &[0; 3]);
-            self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, vk::IndexType::UINT32);
+            self.gpu.raw.cmd_bind_index_buffer(r.commands, indices.raw, 0, index_type);
         }
     }
 }
@@ -407,8 +409,21 @@ impl Slot {
             vertices: host("streamed vertices", limits.vertices * size_of::<ExplicitVertex>(), Usage::VERTEX_BUFFER)?,
             normals: host("streamed normals", limits.normals * size_of::<VertexNormals>(), Usage::VERTEX_BUFFER)?,
             indices: host("streamed indices", limits.indices * 4, Usage::INDEX_BUFFER)?,
+            index_type: vk::IndexType::UINT32,
             staging: host("upload staging", limits.upload_bytes, Usage::TRANSFER_SRC)?,
         })
+    }
+
+    /// Writes the frame's streamed indices, 16 bits each if all of them fit.
+    fn write_indices(&mut self, indices: &[u32]) {
+        let highest = indices.iter().copied().fold(0, u32::max);
+        if highest <= u32::from(u16::MAX) {
+            self.index_type = vk::IndexType::UINT16;
+            self.indices.write_short(indices);
+        } else {
+            self.index_type = vk::IndexType::UINT32;
+            self.indices.write(0, cast_slice(indices));
+        }
     }
 
     fn describe(&self, gpu: &Gpu, images: &[Image; 4], samplers: [vk::Sampler; 4]) {

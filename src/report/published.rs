@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::html::number;
-use crate::bench::results::{CaseResult, Results, frame_ratio};
+use crate::bench::results::{CaseResult, Results, TimeSummary, frame_ratio};
 use crate::bench::statistics::Estimate;
 
 /// One published table.
@@ -52,6 +52,8 @@ pub struct Rule {
     peers_p99_px: Option<f64>,
     /// What stands there is then also this figure that the technique told of itself.
     figure: Option<String>,
+    /// What stands there is then the selection alone, on the host; of several cases the one that selects fastest.
+    selection: bool,
     /// What stands there is then how many times as fast as a case of this rule it is, at the same tolerance in the same
     /// scene.
     over: Option<Box<Rule>>,
@@ -80,6 +82,7 @@ impl Rule {
     pub fn ours(&self, results: &Results) -> Option<String> {
         match &self.over {
             Some(other) => self.speed_ups(other, results),
+            None if self.selection => self.fastest_selection(results),
             None => self.fastest(results),
         }
     }
@@ -101,9 +104,24 @@ impl Rule {
         (!found.is_empty()).then(|| found.join("\n"))
     }
 
+    /// The cases that were timed.
+    fn timed<'a>(&self, results: &'a Results) -> impl Iterator<Item = (&'a CaseResult, &'a TimeSummary)> {
+        results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)))
+    }
+
+    fn fastest_selection(&self, results: &Results) -> Option<String> {
+        let (result, time) = self.timed(results).min_by(|a, b| a.1.select_ms.total_cmp(&b.1.select_ms))?;
+        let [series, px] = [result.case.series(), number(result.case.tolerance_px)];
+        let [ms, triangles] = [number(time.select_ms), number(time.triangles)];
+        let [often, rate] =
+            [1000.0, time.triangles * 1000.0].map(|n| number(n / time.select_ms.max(f64::MIN_POSITIVE)));
+        Some(format!(
+            "{series} {px} px: {ms} ms of selection ({often} a second), {triangles} triangles ({rate} a second)"
+        ))
+    }
+
     fn fastest(&self, results: &Results) -> Option<String> {
-        let timed =
-            results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)));
+        let timed = self.timed(results);
         let timed = timed.filter(|(_, time)| self.figure.as_ref().is_none_or(|name| time.figures.contains_key(name)));
         let (result, time) = timed.min_by(|a, b| a.1.frame_ms.value.total_cmp(&b.1.frame_ms.value))?;
         let figure =

@@ -123,3 +123,43 @@ fn a_probed_frame_is_painted_too() {
         assert_eq!(depth_bytes(gpu), 0);
     });
 }
+
+/// Nearest first every pixel is drawn once; in no order some are drawn over, furthest first as often as land lies there.
+#[test]
+fn nearest_first_nothing_is_drawn_over() {
+    on_device(|gpu| {
+        let field = mountains();
+        let mut view = aslant(&field, SIZE, 1.0);
+        // Low over the land, so that much of it is behind other land.
+        view.eye = field.world_at(3.3, 92.6, f64::from(field.height(3, 92))) + glam::DVec3::Y * 150.0;
+        view.world_from_eye = View::turned(-35.0, -3.0, 0.0);
+        let passed = ["front", "shuffled", "back", "painter"].map(|order| {
+            let mut technique = technique(&field, "sorted-strips", &[&format!("order={order}")]);
+            let mut stage = stage(gpu, &field, technique.as_ref());
+            let times = stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
+            let covered = stage.picture().pixels().filter(|p| p.0[3] > 0).count() as u64;
+            times.gpu.passed.map(|passed| (passed, covered))
+        });
+        println!("fragments past the depth test, and pixels of land: {passed:?}");
+        let [Some((front, land)), Some((shuffled, _)), Some((back, _)), Some((painter, _))] = passed else {
+            return println!("skipped: this device does not count fragments");
+        };
+        assert!(land > 1000 && front == land, "{passed:?}");
+        assert!(shuffled > front + 50 && back > shuffled + 50 && painter >= back, "{passed:?}");
+    });
+}
+
+/// Indices are 16 bits wide where all of a frame's fit: those of rows of pages do, those of the whole frame do not.
+#[test]
+fn narrow_indices_show_what_wide_ones_do() {
+    on_device(|gpu| {
+        let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
+        let view = aslant(&field, SIZE, 1e-6);
+        let [narrow, wide] = ["order=front", "order=shuffled"]
+            .map(|order| shoot(gpu, &field, technique(&field, "sorted-strips", &[order]).as_mut(), &view));
+        let highest = |list: &DrawList| list.streamed.indices.iter().copied().max();
+        assert!(highest(&narrow.list) <= Some(65535) && highest(&wide.list) > Some(65535));
+        assert!(narrow.picture.pixels().filter(|p| p.0[3] > 0).count() > 1000);
+        assert_eq!(differing(&narrow.picture, &wide.picture), 0);
+    });
+}

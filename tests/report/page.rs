@@ -148,3 +148,21 @@ fn published_figures_stand_beside_ours() {
     assert!(row.contains("geomipmap 1 px") && row.contains(&format!("{frame_ms:.0} ms")), "{row}");
     assert!(page.contains("not in this run"), "clusters are not in this run");
 }
+
+/// What was published of making triangles alone stands beside the host's share of the fastest selection.
+#[test]
+fn published_generation_stands_beside_selection() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = vec![mock::field(65)];
+    let of = |px: f64| mock::case(&fields[0].0, "sorted-strips", px, "certified", "circle");
+    let cases = [0.5, 4.0].map(of).to_vec();
+    mock::run(folder.path(), fields, cases, 1);
+    let page = fs::read_to_string(report::write(folder.path()).unwrap()).unwrap();
+    let results = Results::read(folder.path()).unwrap();
+    let row = page.split("generation alone").nth(1).and_then(|rest| rest.split("</tr>").next()).unwrap();
+    let [slow, fast] = [0, 1].map(|k| results.cases[k].time.as_ref().unwrap().select_ms);
+    assert!(fast < slow, "{fast} {slow}");
+    let told: f64 = row.split(" px: ").nth(1).and_then(|text| text.split(' ').next()).unwrap().parse().unwrap();
+    assert!(row.contains("sorted-strips 4 px: ") && row.contains("ms of selection"), "{row}");
+    assert!((told / fast - 1.0).abs() < 0.01, "{told} for {fast}: {row}");
+}

@@ -31,6 +31,7 @@
 //!
 //! Laws kept: watertight, covered once, error within tolerance (`level=certified`), no state between views.
 
+pub mod blend;
 pub mod cave;
 pub mod certified;
 pub mod footprint;
@@ -52,14 +53,14 @@ use rayon::prelude::*;
 
 use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
-use self::join::{join, starts};
+use self::join::join;
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
-use self::walk::{Ground, Stream, Worker};
+use self::walk::{Ground, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
@@ -70,6 +71,8 @@ use crate::view::{Containment, View};
 const MOST_TRIANGLES: usize = 1 << 21;
 /// The most pages: beyond it they are made larger.
 const MOST_PAGES: u64 = 1 << 16;
+/// Triangles of the frame before from which on rows are walked on all cores: for fewer it takes longer to share them out.
+const LEAST_PARALLEL: usize = 20_000;
 /// What the tolerance is multiplied by until a frame fits.
 const WIDENING: f64 = 1.5;
 
@@ -128,7 +131,7 @@ struct SortedStrips {
     shapes: Shapes,
     pages: Pages,
     splits: Splits,
-    /// One a row of pages, or one for all.
+    /// One a row of pages; if rows are walked one after the other, the first is for all.
     workers: Vec<Worker>,
     /// Length of a triangle's side, tolerances, if levels are uniform.
     edge: Option<f64>,
@@ -137,6 +140,8 @@ struct SortedStrips {
     blends: bool,
     sequence: Sequence,
     is_serial: bool,
+    /// Of the last frame.
+    triangles_before: usize,
     limits: Limits,
     nothing: Geometry,
 }
@@ -165,6 +170,7 @@ impl SortedStrips {
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
             sequence: Sequence::of(settings.word("order")),
             is_serial: settings.variant() == Some("serial"),
+            triangles_before: 0,
             limits,
             nothing: Geometry::default(),
         }
@@ -186,37 +192,37 @@ impl SortedStrips {
         self.pages.set(seen);
     }
 
-    /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the first; its
-    /// last index by row. `None` if they would not fit the limits.
-    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<usize>> {
-        let (field, pages, shapes, limits) = (&*self.field, &self.pages, &self.shapes, self.limits);
+    /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the only one;
+    /// how many vertices and indices each has. `None` if they would not fit the limits.
+    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<[usize; 2]>> {
+        let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
         let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: self.blends };
-        let has_room = |vertices: usize, indices: usize| vertices <= limits.vertices && indices <= limits.indices;
-        if self.is_serial {
-            let worker = &mut workers[0];
+        let has_room =
+            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.limits.indices;
+        if let [worker] = workers {
             let walk = |row: &Row| {
+                let before = worker.stream.lengths();
                 ground.walk_on(row, worker);
-                let Stream { vertices, indices } = &worker.stream;
-                has_room(vertices.len(), indices.len()).then_some(indices.len())
+                let after = worker.stream.lengths();
+                has_room(after).then(|| [0, 1].map(|k| after[k] - before[k]))
             };
             return rows.iter().map(walk).collect();
         }
-        let (vertices, indices) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let sums = [AtomicUsize::new(0), AtomicUsize::new(0)];
         let walk = |(row, worker): (&Row, &mut Worker)| {
             // Once there is too much, no further row is begun.
-            if !has_room(vertices.load(Relaxed), indices.load(Relaxed)) {
+            if !has_room(sums.each_ref().map(|sum| sum.load(Relaxed))) {
                 return None;
             }
             ground.walk_on(row, worker);
-            let Stream { vertices: v, indices: i } = &worker.stream;
-            let [v, i] = [(&vertices, v.len()), (&indices, i.len())].map(|(sum, n)| (sum.fetch_add(n, Relaxed) + n, n));
-            has_room(v.0, i.0).then_some(i.1)
+            let own = worker.stream.lengths();
+            has_room([0, 1].map(|k| sums[k].fetch_add(own[k], Relaxed) + own[k])).then_some(own)
         };
         rows.par_iter().zip(workers).map(walk).collect()
     }
 
     /// The frame's strips under the view's tolerance, as [`Self::walk`] leaves them.
-    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<usize>> {
+    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<[usize; 2]>> {
         for worker in &mut *workers {
             worker.stream.clear();
         }
@@ -233,28 +239,24 @@ impl SortedStrips {
         if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
     }
 
-    fn fill(&self, ends: &[usize], workers: &mut [Worker], list: &mut DrawList) {
+    fn fill(&self, lengths: &[[usize; 2]], workers: &mut [Worker], list: &mut DrawList) {
         let streamed = &mut list.streamed;
-        if self.is_serial {
-            let Stream { vertices, indices } = &mut workers[0].stream;
-            std::mem::swap(&mut streamed.vertices, vertices);
-            std::mem::swap(&mut streamed.indices, indices);
+        if let [worker] = workers {
+            std::mem::swap(&mut streamed.vertices, &mut worker.stream.vertices);
+            std::mem::swap(&mut streamed.indices, &mut worker.stream.indices);
         } else {
-            let streams: Vec<&Stream> = workers[..ends.len()].iter().map(|worker| &worker.stream).collect();
-            let vertices: Vec<_> = streams.iter().map(|stream| stream.vertices.as_slice()).collect();
-            let indices: Vec<_> = streams.iter().map(|stream| stream.indices.as_slice()).collect();
-            let bases = starts(vertices.iter().map(|of_row| of_row.len()));
-            join(&vertices, &mut streamed.vertices, |_, vertex| vertex);
-            join(&indices, &mut streamed.indices, |row, index| bases[row] as u32 + index);
+            let streams = || workers[..lengths.len()].iter().map(|worker| &worker.stream);
+            join(&streams().map(|stream| stream.vertices.as_slice()).collect::<Vec<_>>(), &mut streamed.vertices);
+            join(&streams().map(|stream| stream.indices.as_slice()).collect::<Vec<_>>(), &mut streamed.indices);
         }
-        let mut first = 0;
-        for (batch, &end) in (0u32..).zip(ends) {
+        let [mut first_vertex, mut first] = [0; 2];
+        for (batch, [vertices, indices]) in (0u32..).zip(lengths.iter().map(|own| own.map(|n| n as u32))) {
             list.instances.push(Instance { batch, ..Instance::default() });
-            let end = if self.is_serial { end as u32 } else { first + end as u32 };
             let (source, topology) = (Source::Streamed, Topology::Triangles);
-            let instances = batch..batch + 1;
-            list.draws.push(Draw { source, topology, indices: first..end, instances, first_vertex: 0 });
-            first = end;
+            let (indices, instances) = (first..first + indices, batch..batch + 1);
+            first = indices.end;
+            list.draws.push(Draw { source, topology, indices, instances, first_vertex });
+            first_vertex += vertices;
         }
         self.sequence.arrange(list);
     }
@@ -274,17 +276,19 @@ impl Technique for SortedStrips {
         let gaze = Gaze::new(&self.field, view);
         let rows = self.pages.rows(&gaze);
         let mut workers = std::mem::take(&mut self.workers);
-        let count = if self.is_serial { 1 } else { rows.len() };
-        workers.resize_with(count.max(workers.len()), Worker::default);
+        workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
+        let is_serial = self.is_serial || self.triangles_before < LEAST_PARALLEL;
+        let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
         let mut wider = *view;
-        let ends = loop {
-            if let Some(ends) = self.strips(&wider, &gaze, &rows, &mut workers) {
-                break ends;
+        let lengths = loop {
+            if let Some(lengths) = self.strips(&wider, &gaze, &rows, of_frame) {
+                break lengths;
             }
             wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
         };
-        self.fill(&ends, &mut workers, list);
+        self.fill(&lengths, of_frame, list);
         self.workers = workers;
+        self.triangles_before = list.streamed.indices.len() / 3;
         list.widening =
             if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px };
     }

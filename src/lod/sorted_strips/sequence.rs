@@ -1,4 +1,17 @@
 //! The order in which a frame's triangles are drawn. They are made nearest first; all other orders are of the same ones.
+//!
+//! Fragments that pass the depth test per covered pixel, over 1025 × 1025 samples at 1 px, 1280 × 720 pixels, 12 frames of
+//! each path:
+//!
+//! | path | nearest first | shuffled | furthest first | brute force |
+//! |---|---|---|---|---|
+//! | circle | 1.000 | 1.387 | 2.062 | 1.547 |
+//! | skim | 1.000 | 1.496 | 2.496 | 1.234 |
+//! | corner | 1.000 | 1.100 | 1.233 | 1.000 |
+//!
+//! Triangles stay a list. Over a view of 464 711 triangles strips with restart break off after 1.97 triangles on average, as
+//! the order of sight goes to and fro: 16 % fewer indices, 18 % with repeated ones, where indices of 16 bits take half the
+//! bytes. Rows of pages count from a first vertex of their own, so that their indices fit.
 
 use crate::draw::{DrawList, Hiding};
 
@@ -39,7 +52,10 @@ impl Sequence {
         match self {
             Self::NearestFirst => {}
             Self::FurthestFirst | Self::Painter => turn_round(list),
-            Self::Shuffled => shuffle(list.streamed.indices.as_chunks_mut().0),
+            Self::Shuffled => {
+                share_first_vertex(list);
+                shuffle(list.streamed.indices.as_chunks_mut().0);
+            }
         }
     }
 }
@@ -51,6 +67,15 @@ fn turn_round(list: &mut DrawList) {
     list.streamed.indices.chunks_exact_mut(3).for_each(|t| t.reverse());
     list.draws.reverse();
     list.draws.iter_mut().for_each(|draw| draw.indices = count - draw.indices.end..count - draw.indices.start);
+}
+
+/// Lets the indices of all draws count from the same vertex.
+fn share_first_vertex(list: &mut DrawList) {
+    for draw in &mut list.draws {
+        let indices = &mut list.streamed.indices[draw.indices.start as usize..draw.indices.end as usize];
+        indices.iter_mut().for_each(|index| *index += draw.first_vertex);
+        draw.first_vertex = 0;
+    }
 }
 
 /// The same for the same triangles: each changes places with one of those before it.
@@ -67,18 +92,18 @@ mod tests {
     use super::*;
     use crate::draw::{Draw, Source, Topology};
 
-    /// Two draws of 40 and of 60 triangles, each of whose corners has a number of its own.
+    /// Two draws of 40 and of 60 triangles, each of whose corners is a vertex of its own.
     fn list() -> DrawList {
         let mut list = DrawList::default();
-        list.streamed.indices = (0..300).collect();
-        let draw = |indices, first| Draw {
+        list.streamed.indices = (0..120).chain(0..180).collect();
+        let draw = |indices, first, first_vertex| Draw {
             source: Source::Streamed,
             topology: Topology::Triangles,
             indices,
             instances: first..first + 1,
-            first_vertex: 0,
+            first_vertex,
         };
-        list.draws = vec![draw(0..120, 0), draw(120..300, 1)];
+        list.draws = vec![draw(0..120, 0, 0), draw(120..300, 1, 120)];
         list
     }
 
@@ -103,7 +128,7 @@ mod tests {
         assert_eq!((far.instances, far.indices, near.instances, near.indices), (1..2, 0..180, 0..1, 180..300));
         assert_eq!(
             (&list.streamed.indices[..3], &list.streamed.indices[297..]),
-            (&[297, 298, 299][..], &[0, 1, 2][..])
+            (&[177, 178, 179][..], &[0, 1, 2][..])
         );
     }
 

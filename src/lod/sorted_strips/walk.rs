@@ -30,7 +30,6 @@ use super::pages::{Gaze, Pages, Row, Run, placed};
 use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
 use super::splits::Levels;
 use crate::draw::ExplicitVertex;
-use crate::draw::place::morphed_height;
 use crate::height::Field;
 
 /// Vertices and indices of a part of a frame.
@@ -38,11 +37,16 @@ use crate::height::Field;
 pub struct Stream {
     /// Vertices, each once.
     pub vertices: Vec<ExplicitVertex>,
-    /// Three a triangle, nearest first.
+    /// Three a triangle, nearest first, counted from the first vertex of their row.
     pub indices: Vec<u32>,
 }
 
 impl Stream {
+    /// How many vertices and indices it has.
+    pub fn lengths(&self) -> [usize; 2] {
+        [self.vertices.len(), self.indices.len()]
+    }
+
     /// Empties it and keeps its memory.
     pub fn clear(&mut self) {
         self.vertices.clear();
@@ -123,6 +127,8 @@ struct Side {
 struct Walk<'a, L> {
     ground: &'a Ground<'a, L>,
     stream: Stream,
+    /// The row's first vertex in the stream: indices count from it.
+    first_vertex: usize,
     /// The first corner: on the line behind the row, at the run's first side.
     origin: [i32; 2],
     /// Steps along the minor and the major direction, ±1.
@@ -160,6 +166,7 @@ impl<L: Levels> Ground<'_, L> {
         let longest = row.runs.iter().map(|run| run.pages * side).max().unwrap_or(0);
         let mut walk = Walk {
             ground: self,
+            first_vertex: worker.stream.vertices.len(),
             stream: std::mem::take(&mut worker.stream),
             origin: [0, behind(row.sign, row.row)],
             signs: [0, row.sign],
@@ -191,42 +198,6 @@ impl<L: Levels> Ground<'_, L> {
         }
         *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start, order: walk.order };
     }
-}
-
-impl<L: Levels> Ground<'_, L> {
-    /// The vertex at a position: the same wherever it is asked for. Its target is the middle of the edge of the next
-    /// level on which it lies, as that edge is drawn (Finch & Bishop, §4.9).
-    fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
-        let [x, z] = position;
-        let height = self.field.height(x as u32, z as u32);
-        let still = ExplicitVertex { position, height, target: height, ..ExplicitVertex::default() };
-        let level = (x | z).trailing_zeros();
-        if !self.blends || level >= self.pages.grid.level {
-            return still;
-        }
-        let morph = self.levels.weight(level, position);
-        let apart = half_edge(position, level);
-        let ends = [-1, 1].map(|sign| [x + sign * apart[0], z + sign * apart[1]]);
-        let last = self.pages.grid.last;
-        // The field's edge is no vertex of the next level, unless it is whole there.
-        let is_inside =
-            (0..2).all(|k| ((position[k] >> (level + 1)) + i32::from(apart[k] != 0)) << (level + 1) <= last[k]);
-        if morph == 0.0 || !is_inside {
-            return still;
-        }
-        let [a, b] = ends.map(|end| self.vertex(end)).map(|v| morphed_height(v.height, v.target, v.morph));
-        ExplicitVertex { target: (a + b) * 0.5, morph, ..still }
-    }
-}
-
-/// From a vertex that a level is the coarsest to have to one end of the edge of the next level in whose middle it is.
-fn half_edge(position: [i32; 2], level: u32) -> [i32; 2] {
-    let step = 1 << level;
-    let mut apart = position.map(|n| n & step);
-    if apart == [step; 2] && ((position[0] >> (level + 1)) + (position[1] >> (level + 1))) & 1 == 1 {
-        apart[1] = -apart[1];
-    }
-    apart
 }
 
 impl<L: Levels> Walk<'_, L> {
@@ -399,6 +370,7 @@ impl<L: Levels> Walk<'_, L> {
         };
         let places = shape.places.map(|[along, forward]| [collapsed(0, u, along), collapsed(1, v, forward)]);
         let (mirrored, Stream { vertices, indices }) = (self.mirrored, &mut self.stream);
+        let vertices = &vertices[self.first_vertex..];
         shape.visit_in_order(&places, eye, |[a, b, c]| {
             let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|slot| slots[slot]);
             if has_area(vertices, triangle) {
@@ -464,7 +436,7 @@ impl<L: Levels> Walk<'_, L> {
         let (at, last) = (placed(self.ground.gaze.major, v, u), self.ground.pages.grid.last);
         let position = [at[0].min(last[0]), at[1].min(last[1])];
         self.stream.vertices.push(self.ground.vertex(position));
-        self.stream.vertices.len() as u32 - 1
+        (self.stream.vertices.len() - self.first_vertex) as u32 - 1
     }
 }
 
