@@ -15,6 +15,7 @@ pub mod scene;
 pub mod synth;
 #[cfg(feature = "viewer")]
 pub mod view;
+pub mod working_set;
 
 use std::process::ExitCode;
 
