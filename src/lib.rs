@@ -14,6 +14,7 @@
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
 //! - [`mod@bench`]: error against run time, along named paths.
 //! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
+//! - [`stress`]: the laws, and the battery of stiff and extreme cases.
 //! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
@@ -41,6 +42,8 @@ pub mod scene;
 pub mod bench;
 
 pub mod profile;
+
+pub mod stress;
 
 pub mod report;
 

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::draw::layout::Frame;
-use crate::draw::{Manner, Morph, Normals, Seams};
+use crate::draw::{Hiding, Manner, Morph, Normals, Seams};
 use crate::height::{Field, Samples};
 use crate::texture::detail;
 use crate::view::{Lens, View};
@@ -140,6 +140,11 @@ impl ScenePlan {
         Self { manner, ..self }
     }
 
+    /// Whether pictures need a depth buffer.
+    pub fn has_depth(&self) -> bool {
+        self.manner.hiding == Hiding::ByDepth
+    }
+
     /// Texels of a page of the height texture (x, z).
     pub fn page_size(&self) -> [u32; 2] {
         if self.page_shift == 0 { self.stored } else { [1 << self.page_shift; 2] }
@@ -201,6 +206,7 @@ impl ScenePlan {
                 "the height texture lights each pixel",
                 0,
             ),
+            sort(self.has_depth(), "depth buffer", "triangles come in any order", "the furthest come first", 0),
             sort(self.fog, "fog", "asked for", "density 0", 0),
             sort(self.detail, "detail textures", "asked for", "the ground is not looked at from near", detail::bytes()),
             sort(overlay, "overlay", "asked for", "no picture is laid over", 0),

@@ -146,7 +146,7 @@ impl Laboratory for DeviceLaboratory {
             helm.learn(view, stage.list.triangles(), times.frame_ms);
             if is_measured {
                 let truth = self.truth(scene, frame)?;
-                let fragments = times.gpu.statistics.map(|[.., fragments]| fragments);
+                let fragments = [times.gpu.statistics.map(|[.., run]| run), times.gpu.passed];
                 look(scene, (frame, view), technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
                 if let Some((from, resident, list)) = &before {
                     let old = pop::State { view: from, resident, list };
@@ -177,7 +177,7 @@ fn look(
     technique: &dyn Technique,
     stage: &mut Stage,
     truth: &Truth,
-    fragments: Option<u64>,
+    fragments: [Option<u64>; 2],
     pool: &mut Pool,
 ) -> Result<()> {
     let (field, resident) = (scene.field, technique.resident());

@@ -44,7 +44,8 @@ pub struct Pool {
     shown: u64,
     hidden: u64,
     sizes: Option<Histogram>,
-    fragments: Option<u64>,
+    /// Run, and past the depth test.
+    fragments: [Option<u64>; 2],
     covered: u64,
     peers: peers::Pool,
     pictures: Vec<pictures::Difference>,
@@ -138,8 +139,8 @@ impl Pool {
         }
     }
 
-    /// What a frame's triangles were spent on; fragments run, and pixels covered by land.
-    pub fn economy(&mut self, economy: &economy::Economy, fragments: Option<u64>, covered: u64) {
+    /// What a frame's triangles were spent on; fragments run, and past the depth test, and pixels covered by land.
+    pub fn economy(&mut self, economy: &economy::Economy, fragments: [Option<u64>; 2], covered: u64) {
         self.in_view += economy.shown + economy.facing_away;
         self.shown += economy.shown;
         self.hidden += economy.hidden;
@@ -148,7 +149,7 @@ impl Pool {
             None => self.sizes = Some(economy.sizes_px.clone()),
             Some(sizes) => sizes.merge(&economy.sizes_px),
         }
-        self.fragments = fragments.map(|n| n + self.fragments.unwrap_or(0));
+        self.fragments = [0, 1].map(|k| fragments[k].map(|n| n + self.fragments[k].unwrap_or(0)));
         self.covered += covered;
     }
 
@@ -207,7 +208,8 @@ impl Pool {
                 pixels_per_triangle: bins(sizes),
                 hidden_share: self.hidden as f64 / self.shown.max(1) as f64,
                 subpixel_share: self.sub_pixel / self.shown.max(1) as f64,
-                overdraw: self.fragments.and_then(|fragments| overdraw(fragments, self.covered)),
+                overdraw: self.fragments[0].and_then(|run| overdraw(run, self.covered)),
+                passed: self.fragments[1].and_then(|passed| overdraw(passed, self.covered)),
             }),
             reference,
             peers_px: (peers.pixels > 0).then_some(PeersError {

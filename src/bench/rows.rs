@@ -353,8 +353,11 @@ pub struct Economy {
     pub hidden_share: f64,
     /// Share, 0 to 1, of triangles below one pixel.
     pub subpixel_share: f64,
-    /// Fragments run per covered pixel.
+    /// Fragments run per covered pixel, as the driver counts them: software devices count whole blocks of pixels.
     pub overdraw: Option<f64>,
+    /// Fragments that passed the depth test per covered pixel: 1 if nothing is drawn over.
+    #[serde(default)]
+    pub passed: Option<f64>,
 }
 
 /// Near-optimal meshes of the whole field at a case's largest vertical error.

@@ -12,6 +12,7 @@ pub mod redraw;
 pub mod render;
 pub mod report;
 pub mod scene;
+pub mod stress;
 pub mod synth;
 #[cfg(feature = "viewer")]
 pub mod view;
@@ -69,6 +70,8 @@ pub enum Command {
     View(view::ViewerArgs),
     /// Error against run time: every technique at every tolerance along named paths.
     Bench(bench::BenchArgs),
+    /// The stability battery: every technique on stiff and extreme cases.
+    Stress(stress::StressArgs),
     /// The report of a benchmark, drawn again from its rows.
     Report(redraw::ReportArgs),
     /// A synthetic field.
@@ -121,6 +124,7 @@ fn run(cli: Cli) -> Result<Outcome> {
         #[cfg(feature = "viewer")]
         Some(Command::View(args)) => view::run(&common, &args),
         Some(Command::Bench(args)) => bench::run(&common, &args),
+        Some(Command::Stress(args)) => stress::run(&common, &args),
         Some(Command::Report(args)) => redraw::run(&common, &args),
         Some(Command::Synth(args)) => synth::run(&common, &args),
         None => without_subcommand(&common),

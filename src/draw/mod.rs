@@ -96,6 +96,16 @@ pub enum Seams {
     Skirts,
 }
 
+/// What keeps land behind other land out of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hiding {
+    /// A depth buffer: draws come in any order.
+    #[default]
+    ByDepth,
+    /// The order of the triangles: the furthest one comes first, and the last one drawn shows (painter's algorithm).
+    ByOrder,
+}
+
 /// What a technique's lists ask of the programs that draw them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Manner {
@@ -105,6 +115,8 @@ pub struct Manner {
     pub seams: Seams,
     /// Where normals come from.
     pub normals: Normals,
+    /// What hides land behind other land.
+    pub hiding: Hiding,
 }
 
 /// How draws reach the device; the triangles are the same.

@@ -60,6 +60,8 @@ pub struct Gpu {
     pub timestamp_ns: f64,
     /// Whether pipeline statistics can be queried.
     pub has_statistics: bool,
+    /// Whether fragments that pass the depth test can be counted.
+    pub counts_passed: bool,
     /// Whether vertex programs may write to buffers: what capturing the as-drawn mesh needs.
     pub captures: bool,
     /// Whether the number of draws may come from a buffer (`drawIndirectCount`): what selection on the device needs.
@@ -194,6 +196,7 @@ impl Gpu {
             .multi_draw_indirect(true)
             .draw_indirect_first_instance(true)
             .fill_mode_non_solid(true)
+            .occlusion_query_precise(available.occlusion_query_precise == vk::TRUE)
             .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE)
             .vertex_pipeline_stores_and_atomics(available.vertex_pipeline_stores_and_atomics == vk::TRUE);
         let counts_draws = counts_draws(instance, candidate.raw);
@@ -244,6 +247,7 @@ impl Gpu {
             limits,
             timestamp_ns: if timestamp_bits > 0 { f64::from(limits.timestamp_period) } else { 0.0 },
             has_statistics: available.pipeline_statistics_query == vk::TRUE,
+            counts_passed: available.occlusion_query_precise == vk::TRUE,
             counts_draws,
             captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),

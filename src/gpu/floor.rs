@@ -28,7 +28,7 @@ impl Floor {
     /// Makes the pass for a scene, whose descriptors have the layout `scene`, over pictures of this target.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout, target: &Offscreen) -> Result<Self> {
         let sampler = pages::sampler(gpu, Sampling::Texels)?;
-        let depth = Bound::Texture(sampler, target.depth.view, vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL);
+        let depth = Bound::Texture(sampler, target.depth_image().view, vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL);
         let bindings = Bindings::new(gpu, "floor", Some(scene), vk::ShaderStageFlags::FRAGMENT, &[depth], 0)?;
         let mut floor = Self { gpu: Arc::clone(gpu), bindings, pipeline: vk::Pipeline::null(), sampler };
         floor.pipeline = pipelines::make(
@@ -44,7 +44,7 @@ impl Floor {
                 wireframe: false,
                 depth: None,
                 cull: vk::CullModeFlags::NONE,
-                formats: Some(Offscreen::FORMATS),
+                formats: Some(Offscreen::formats(false)),
             },
         )?;
         Ok(floor)
@@ -55,7 +55,7 @@ impl Floor {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
         let written = target::DEPTH_WRITTEN;
         let read = (Stage::FRAGMENT_SHADER, Access::SHADER_SAMPLED_READ, Layout::DEPTH_READ_ONLY_OPTIMAL);
-        barriers(recording.gpu, recording.commands, &[target.depth.barrier(written, read)]);
+        barriers(recording.gpu, recording.commands, &[target.depth_image().barrier(written, read)]);
         target::begin(recording, target.attachment(), None);
         recording.scope("floor", |r| {
             let (raw, commands) = (&r.gpu.raw, r.commands);
@@ -70,7 +70,7 @@ impl Floor {
             Ok(())
         })?;
         target::end(recording);
-        barriers(recording.gpu, recording.commands, &[target.depth.barrier(read, written)]);
+        barriers(recording.gpu, recording.commands, &[target.depth_image().barrier(read, written)]);
         Ok(())
     }
 }

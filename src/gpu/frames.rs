@@ -25,6 +25,8 @@ pub struct Timing {
     pub total_ms: f64,
     /// Vertices run, primitives after clipping, fragments run — of the pass named `terrain`.
     pub statistics: Option<[u64; 3]>,
+    /// Fragments of the pass named `terrain` that passed the depth test, where [`Frames::counts_passed`].
+    pub passed: Option<u64>,
 }
 
 /// The slots.
@@ -33,6 +35,8 @@ pub struct Frames {
     slots: Vec<Slot>,
     next: usize,
     measured: bool,
+    /// Whether fragments that pass the depth test are counted from the next frame on, if the device can: it costs time.
+    pub counts_passed: bool,
     /// The newest timing read back.
     pub timing: Timing,
 }
@@ -43,6 +47,8 @@ struct Slot {
     fence: vk::Fence,
     stamps: vk::QueryPool,
     statistics: vk::QueryPool,
+    passed: vk::QueryPool,
+    counts_passed: bool,
     scopes: Vec<&'static str>,
     has_statistics: bool,
 }
@@ -64,7 +70,8 @@ impl Frames {
     pub fn new(gpu: &Arc<Gpu>, measured: bool) -> Result<Self> {
         let measured = measured && gpu.timestamp_ns > 0.0;
         let slots = (0..SLOTS).map(|_| Slot::new(gpu, measured)).collect::<Result<_>>()?;
-        Ok(Self { gpu: Arc::clone(gpu), slots, next: 0, measured, timing: Timing::default() })
+        let timing = Timing::default();
+        Ok(Self { gpu: Arc::clone(gpu), slots, next: 0, measured, counts_passed: false, timing })
     }
 
     /// Waits for the next slot, reads its timing, and starts recording.
@@ -74,6 +81,7 @@ impl Frames {
         let state = &mut self.slots[slot];
         state.scopes.clear();
         state.has_statistics = false;
+        state.counts_passed = self.counts_passed && state.passed != vk::QueryPool::null();
         // SAFETY: the slot's fence says its commands have ended.
         unsafe {
             self.gpu.raw.reset_command_pool(state.pool, vk::CommandPoolResetFlags::empty())?;
@@ -81,6 +89,9 @@ impl Frames {
                 self.gpu.raw.reset_query_pool(state.stamps, 0, 2 * STAMP * SCOPES);
                 if state.statistics != vk::QueryPool::null() {
                     self.gpu.raw.reset_query_pool(state.statistics, 0, 1);
+                }
+                if state.counts_passed {
+                    self.gpu.raw.reset_query_pool(state.passed, 0, 1);
                 }
             }
             let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
@@ -163,10 +174,16 @@ impl Recording<'_> {
                 let flags = vk::QueryControlFlags::empty();
                 self.gpu.raw.cmd_begin_query(commands, self.state.statistics, 0, flags);
             }
+            if counted && self.state.counts_passed {
+                self.gpu.raw.cmd_begin_query(commands, self.state.passed, 0, vk::QueryControlFlags::PRECISE);
+            }
         }
         let result = record(self);
         // SAFETY: the queries begun above are ended in the same command buffer.
         unsafe {
+            if counted && self.state.counts_passed {
+                self.gpu.raw.cmd_end_query(commands, self.state.passed, 0);
+            }
             if counted {
                 self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
             }
@@ -210,7 +227,13 @@ impl Slot {
             } else {
                 vk::QueryPool::null()
             };
-            Ok(Self { pool, commands, fence, stamps, statistics, scopes: Vec::new(), has_statistics: false })
+            let passed = if measured && gpu.has_statistics && gpu.counts_passed {
+                query(vk::QueryType::OCCLUSION, 1, none)?
+            } else {
+                vk::QueryPool::null()
+            };
+            let (scopes, has_statistics, counts_passed) = (Vec::new(), false, false);
+            Ok(Self { pool, commands, fence, stamps, statistics, passed, counts_passed, scopes, has_statistics })
         }
     }
 
@@ -219,17 +242,21 @@ impl Slot {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         let ms = |from: u64, to: u64| to.wrapping_sub(from) as f64 * gpu.timestamp_ns / 1e6;
         let passes = self.scopes.iter().zip(stamps.chunks(2)).map(|(name, t)| (*name, ms(t[0], t[1]))).collect();
-        let statistics = if self.has_statistics {
-            let mut counts = [[0u64; 3]];
-            // SAFETY: the frame has ended and wrote this query.
-            unsafe { gpu.raw.get_query_pool_results(self.statistics, 0, &mut counts, flags)? };
-            Some(counts[0])
-        } else {
-            None
-        };
+        let (mut counts, mut passed) = ([[0u64; 3]], [0u64]);
+        let has_passed = self.has_statistics && self.counts_passed;
+        // SAFETY: the frame has ended and wrote the queries that are read.
+        unsafe {
+            if self.has_statistics {
+                gpu.raw.get_query_pool_results(self.statistics, 0, &mut counts, flags)?;
+            }
+            if has_passed {
+                gpu.raw.get_query_pool_results(self.passed, 0, &mut passed, flags)?;
+            }
+        }
+        let (statistics, passed) = (self.has_statistics.then_some(counts[0]), has_passed.then_some(passed[0]));
         let total_ms = ms(stamps[0], stamps[stamps.len() - 1]);
         let ticks = stamps.chunks(2).map(|t| [t[0], t[1]]).collect();
-        Ok(Timing { passes, ticks, total_ms, statistics })
+        Ok(Timing { passes, ticks, total_ms, statistics, passed })
     }
 }
 
@@ -241,6 +268,7 @@ impl Drop for Frames {
             for slot in &self.slots {
                 self.gpu.raw.destroy_query_pool(slot.stamps, None);
                 self.gpu.raw.destroy_query_pool(slot.statistics, None);
+                self.gpu.raw.destroy_query_pool(slot.passed, None);
                 self.gpu.raw.destroy_fence(slot.fence, None);
                 self.gpu.raw.destroy_command_pool(slot.pool, None);
             }

@@ -27,11 +27,7 @@ pub struct Hud {
 impl Hud {
     /// Draws to attachments of these formats.
     pub fn new(gpu: &Arc<Gpu>, formats: Formats) -> Result<Self> {
-        let mode = RenderMode::DynamicRendering(DynamicRendering {
-            color_attachment_format: formats.colour,
-            depth_attachment_format: Some(formats.depth),
-            stencil_attachment_format: None,
-        });
+        let mode = mode(formats);
         let is_srgb = format!("{:?}", formats.colour).contains("SRGB");
         let options = Options { in_flight_frames: SLOTS, srgb_framebuffer: is_srgb, ..Default::default() };
         let renderer = Renderer::with_allocator(Accounted(Arc::clone(gpu)), gpu.raw.clone(), mode, options)
@@ -40,6 +36,12 @@ impl Hud {
         // SAFETY: the device is alive; Drop destroys the pool.
         let pool = unsafe { gpu.raw.create_command_pool(&info, None) }?;
         Ok(Self { renderer, pool, gpu: Arc::clone(gpu), is_reserved: false })
+    }
+
+    /// Draws from now on to attachments of these formats. It waits for the device.
+    pub fn reformat(&mut self, formats: Formats) -> Result<()> {
+        self.gpu.wait_idle()?;
+        self.renderer.set_render_mode(mode(formats)).context("the overlay's pipeline")
     }
 
     /// Takes over changed textures, between frames. It waits for the device: textures in use change.
@@ -75,6 +77,14 @@ impl Hud {
             self.renderer.cmd_draw(r.commands, extent, pixels_per_point, primitives).context("drawing the overlay")
         })
     }
+}
+
+fn mode(formats: Formats) -> RenderMode {
+    RenderMode::DynamicRendering(DynamicRendering {
+        color_attachment_format: formats.colour,
+        depth_attachment_format: formats.depth,
+        stencil_attachment_format: None,
+    })
 }
 
 impl Drop for Hud {

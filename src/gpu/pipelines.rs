@@ -23,6 +23,8 @@ pub struct Pipelines {
     pub layout: vk::PipelineLayout,
     /// Behind the land.
     pub sky: vk::Pipeline,
+    /// Whether depth says what hides what; else what is drawn last does.
+    pub has_depth: bool,
     terrain: BTreeMap<(Source, Topology), vk::Pipeline>,
 }
 
@@ -50,8 +52,8 @@ impl Pipelines {
             (set_layout, gpu.raw.create_pipeline_layout(&info, None)?)
         };
         gpu.name(layout, "scene");
-        let mut pipelines =
-            Self { gpu: Arc::clone(gpu), set_layout, layout, sky: vk::Pipeline::null(), terrain: BTreeMap::new() };
+        let (sky, has_depth) = (vk::Pipeline::null(), formats.depth.is_some());
+        let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, has_depth, terrain: BTreeMap::new() };
         pipelines.sky = pipelines.make_sky(formats)?;
         for source in [Source::Lattice, Source::Resident] {
             for topology in [Topology::Triangles, Topology::Strip] {
@@ -78,7 +80,7 @@ impl Pipelines {
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             wireframe: false,
             // Only where nothing was drawn.
-            depth: Some((false, vk::CompareOp::EQUAL)),
+            depth: formats.depth.map(|_| (false, vk::CompareOp::EQUAL)),
             cull: vk::CullModeFlags::NONE,
             formats: Some(formats),
         };
@@ -124,13 +126,13 @@ pub(super) fn terrain(
         Source::Lattice => ("lattice", ["lattice.vert", "lattice.capture.vert"]),
         Source::Resident | Source::Streamed => ("explicit", ["explicit.vert", "explicit.capture.vert"]),
     };
-    // Land is drawn first and hides; the far plane lies at depth 0.
-    let hides = Some((true, vk::CompareOp::GREATER));
-    let (vertex, fragment, depth, formats) = match pass {
-        Pass::Picture(f) if has_normals => ("explicit.normals.vert", Some("terrain.normals.frag"), hides, Some(f)),
-        Pass::Picture(formats) => (picture, Some("terrain.frag"), hides, Some(formats)),
-        Pass::Capture => (capture, None, None, None),
+    let (vertex, fragment, formats) = match pass {
+        Pass::Picture(formats) if has_normals => ("explicit.normals.vert", Some("terrain.normals.frag"), Some(formats)),
+        Pass::Picture(formats) => (picture, Some("terrain.frag"), Some(formats)),
+        Pass::Capture => (capture, None, None),
     };
+    // Land is drawn first and hides; the far plane lies at depth 0.
+    let depth = formats.and_then(|formats| formats.depth).map(|_| (true, vk::CompareOp::GREATER));
     let description = Description {
         name,
         vertex,
@@ -186,7 +188,7 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
     let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-    let depth_format = d.depth.and(d.formats).map_or(vk::Format::UNDEFINED, |formats| formats.depth);
+    let depth_format = d.formats.and_then(|formats| formats.depth).unwrap_or(vk::Format::UNDEFINED);
     let mut rendering = vk::PipelineRenderingCreateInfo::default()
         .color_attachment_formats(&colours)
         .depth_attachment_format(depth_format);

@@ -193,21 +193,22 @@ impl Terrain {
         if pieces.len() > DRAWS + PIPELINES {
             bail!("profile: {} pieces, at most {} can be measured", pieces.len(), DRAWS + PIPELINES);
         }
-        recording.uncounted_scope("terrain", |r| {
-            probe.begin(r, pieces.len());
-            let mut next = 0;
-            self.each_run(r, list, |r, run| {
-                let first = &list.draws[run.start];
-                r.gpu.begin_label(r.commands, pipeline_name(first.source, first.topology));
-                while let Some(piece) = pieces.get(next).filter(|piece| run.contains(&piece.draws.start)) {
-                    probe.around(r, next, &piece.label, || self.submit(r, list, piece.draws.clone()));
-                    next += 1;
-                }
-                r.gpu.end_label(r.commands);
-            });
-            Ok(())
-        })?;
-        self.draw_sky(recording)
+        self.with_sky(recording, |recording| {
+            recording.uncounted_scope("terrain", |r| {
+                probe.begin(r, pieces.len());
+                let mut next = 0;
+                self.each_run(r, list, |r, run| {
+                    let first = &list.draws[run.start];
+                    r.gpu.begin_label(r.commands, pipeline_name(first.source, first.topology));
+                    while let Some(piece) = pieces.get(next).filter(|piece| run.contains(&piece.draws.start)) {
+                        probe.around(r, next, &piece.label, || self.submit(r, list, piece.draws.clone()));
+                        next += 1;
+                    }
+                    r.gpu.end_label(r.commands);
+                });
+                Ok(())
+            })
+        })
     }
 }
 

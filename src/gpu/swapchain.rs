@@ -82,6 +82,8 @@ pub struct Swapchain {
     vsync: bool,
     size: [u32; 2],
     images: Vec<Shown>,
+    /// Whether frames are drawn with depth, and the image that they share once there are images.
+    has_depth: bool,
     depth: Option<Image>,
     can_copy: bool,
     /// Signalled when a slot's image may be drawn to.
@@ -140,6 +142,7 @@ impl Swapchain {
             vsync,
             size: [0; 2],
             images: Vec::new(),
+            has_depth: true,
             depth: None,
             can_copy: false,
             acquired,
@@ -150,7 +153,21 @@ impl Swapchain {
 
     /// Formats to draw with.
     pub fn formats(&self) -> Formats {
-        Formats { colour: self.format.format, depth: DEPTH }
+        Formats { colour: self.format.format, depth: self.has_depth.then_some(DEPTH) }
+    }
+
+    /// Says whether frames from now on are drawn with depth. It waits for the device.
+    pub fn set_depth(&mut self, has_depth: bool) -> Result<()> {
+        if has_depth != self.has_depth {
+            self.gpu.wait_idle()?;
+            self.has_depth = has_depth;
+            self.depth = if self.images.is_empty() { None } else { self.make_depth()? };
+        }
+        Ok(())
+    }
+
+    fn make_depth(&self) -> Result<Option<Image>> {
+        self.has_depth.then(|| depth_image(&self.gpu, self.size, vk::ImageUsageFlags::empty())).transpose()
     }
 
     /// Makes the images fit the window, whose size is `window` where the system leaves that to us. Returns the
@@ -237,7 +254,7 @@ impl Swapchain {
         for image in unsafe { self.loader.get_swapchain_images(self.raw) }? {
             self.images.push(Shown::new(&self.gpu, image, self.format.format)?);
         }
-        self.depth = Some(depth_image(&self.gpu, self.size, vk::ImageUsageFlags::empty())?);
+        self.depth = self.make_depth()?;
         Ok(())
     }
 
@@ -274,12 +291,9 @@ impl Swapchain {
         Ok(Some(Acquired { attachment, wait, signal: drawn, index }))
     }
 
-    /// The depth image that goes with the images.
-    ///
-    /// # Panics
-    /// If [`Swapchain::fit`] never succeeded.
-    pub fn depth(&self) -> Depth<'_> {
-        (self.depth.as_ref().expect("made with the images"), vk::AttachmentStoreOp::DONT_CARE)
+    /// The depth image that goes with the images, if they are drawn with depth.
+    pub fn depth(&self) -> Option<Depth<'_>> {
+        self.depth.as_ref().map(|depth| (depth, vk::AttachmentStoreOp::DONT_CARE))
     }
 
     /// Room for a copy of one frame: made before the frame begins.

@@ -15,8 +15,8 @@ use super::memory::{Buffer, Image, ImageInfo, aspect, barriers, image_barrier, m
 pub struct Formats {
     /// Colour.
     pub colour: vk::Format,
-    /// Depth: 32-bit float, reversed.
-    pub depth: vk::Format,
+    /// Depth: 32-bit float, reversed; `None`: there is none, and what is drawn last shows.
+    pub depth: Option<vk::Format>,
 }
 
 /// Depth: 32-bit float, cleared to 0, the far plane.
@@ -115,32 +115,40 @@ pub fn end(recording: &Recording) {
 /// A picture in memory.
 pub struct Offscreen {
     colour: Image,
-    /// Its depth image.
-    pub depth: Image,
     readback: Buffer,
-    depth_readback: Buffer,
+    depth: Option<DepthPicture>,
+}
+
+/// Depths in memory.
+struct DepthPicture {
+    image: Image,
+    readback: Buffer,
 }
 
 impl Offscreen {
-    /// A picture of this size, or which limit it exceeds.
+    /// A picture of this size without depth, or which limit it exceeds.
     pub fn new(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Self> {
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
-        let info = ImageInfo { purpose: "colour", size, layers: None, format: Self::FORMATS.colour, usage };
-        // Both colour and depth have four bytes a pixel.
-        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
-        let readback =
-            |purpose| Buffer::new(gpu, purpose, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
-        let depth_uses = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::SAMPLED;
-        Ok(Self {
-            colour: Image::new(gpu, info)?,
-            depth: depth_image(gpu, size, depth_uses)?,
-            readback: readback("read-back")?,
-            depth_readback: readback("depth read-back")?,
-        })
+        let info = ImageInfo { purpose: "colour", size, layers: None, format: Self::COLOUR, usage };
+        Ok(Self { colour: Image::new(gpu, info)?, readback: readback(gpu, "read-back", size)?, depth: None })
     }
 
-    /// The formats of every offscreen picture.
-    pub const FORMATS: Formats = Formats { colour: vk::Format::R8G8B8A8_SRGB, depth: DEPTH };
+    /// Gives it depth, unless it has it.
+    pub fn add_depth(&mut self, gpu: &Arc<Gpu>) -> Result<()> {
+        if self.depth.is_none() {
+            let (size, uses) = (self.colour.size, vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::SAMPLED);
+            let (image, readback) = (depth_image(gpu, size, uses)?, readback(gpu, "depth read-back", size)?);
+            self.depth = Some(DepthPicture { image, readback });
+        }
+        Ok(())
+    }
+
+    const COLOUR: vk::Format = vk::Format::R8G8B8A8_SRGB;
+
+    /// The formats of every offscreen picture with depth or without.
+    pub fn formats(has_depth: bool) -> Formats {
+        Formats { colour: Self::COLOUR, depth: has_depth.then_some(DEPTH) }
+    }
 
     /// The attachment to draw into.
     pub fn attachment(&self) -> Attachment {
@@ -148,9 +156,21 @@ impl Offscreen {
         Attachment { image: raw, view, format, size }
     }
 
-    /// The depth to draw with; its values stay after the frame.
-    pub fn kept_depth(&self) -> Depth<'_> {
-        (&self.depth, vk::AttachmentStoreOp::STORE)
+    /// The depth to draw with, if it has it; its values stay after the frame.
+    pub fn kept_depth(&self) -> Option<Depth<'_>> {
+        self.depth.as_ref().map(|depth| (&depth.image, vk::AttachmentStoreOp::STORE))
+    }
+
+    /// The depth image.
+    ///
+    /// # Panics
+    /// If it has no depth.
+    pub fn depth_image(&self) -> &Image {
+        &self.depth_picture().image
+    }
+
+    fn depth_picture(&self) -> &DepthPicture {
+        self.depth.as_ref().expect("a picture with depth")
     }
 
     /// Records the copy of the colours to the host, after [`end`].
@@ -162,11 +182,15 @@ impl Offscreen {
     }
 
     /// Records the copy of the depth to the host, after [`end`]; the image stays as the frame left it.
+    ///
+    /// # Panics
+    /// If it has no depth.
     pub fn read_back_depth(&self, recording: &Recording) {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-        copy_out(recording, &self.depth, DEPTH_WRITTEN, &self.depth_readback);
+        let DepthPicture { image, readback } = self.depth_picture();
+        copy_out(recording, image, DEPTH_WRITTEN, readback);
         let copied = (Stage::COPY, Access::TRANSFER_READ, Layout::TRANSFER_SRC_OPTIMAL);
-        barriers(recording.gpu, recording.commands, &[self.depth.barrier(copied, DEPTH_WRITTEN)]);
+        barriers(recording.gpu, recording.commands, &[image.barrier(copied, DEPTH_WRITTEN)]);
     }
 
     /// The picture read back last (after the frame has finished); alpha says where land was drawn.
@@ -177,10 +201,20 @@ impl Offscreen {
     }
 
     /// The depth read back last, row by row from the top; 0 is infinitely far.
+    ///
+    /// # Panics
+    /// If it has no depth.
     pub fn depth_values(&self) -> Vec<f32> {
-        let [width, height] = self.depth.size;
-        bytemuck::pod_collect_to_vec(&self.depth_readback.read()[..4 * width as usize * height as usize])
+        let [width, height] = self.colour.size;
+        let bytes = self.depth_picture().readback.read();
+        bytemuck::pod_collect_to_vec(&bytes[..4 * width as usize * height as usize])
     }
+}
+
+/// A buffer for colours or depths of a picture, which the host reads: both have four bytes a pixel.
+fn readback(gpu: &Arc<Gpu>, purpose: &'static str, [width, height]: [u32; 2]) -> Result<Buffer> {
+    let bytes = 4 * u64::from(width) * u64::from(height);
+    Buffer::new(gpu, purpose, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu)
 }
 
 /// Records the copy of an image's single layer to a buffer that the host reads.

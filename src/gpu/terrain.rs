@@ -124,6 +124,11 @@ impl Terrain {
         Ok(())
     }
 
+    /// Draws from now on with other pipelines of the same scene, which get these in exchange.
+    pub fn exchange(&mut self, pipelines: &mut Pipelines) {
+        std::mem::swap(&mut self.pipelines, pipelines);
+    }
+
     /// Gives the scene another technique: what comes from the field alone stays.
     pub fn retarget(&mut self, kept: Kept) -> Result<()> {
         self.gpu.wait_idle()?;
@@ -205,13 +210,28 @@ impl Terrain {
         memory_barrier(&self.gpu, recording.commands, write, read);
     }
 
-    /// Records the land and then the sky: between the target's begin and end.
+    /// Records the land and the sky: between the target's begin and end.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        recording.scope("terrain", |r| {
-            self.each_run(r, list, |r, run| self.submit(r, list, run));
-            Ok(())
-        })?;
-        self.draw_sky(recording)
+        self.with_sky(recording, |recording| {
+            recording.scope("terrain", |r| {
+                self.each_run(r, list, |r, run| self.submit(r, list, run));
+                Ok(())
+            })
+        })
+    }
+
+    /// Records land, and the sky after it, where depth is 0 still; without depth before it.
+    pub(super) fn with_sky(
+        &self,
+        recording: &mut Recording,
+        record: impl FnOnce(&mut Recording) -> Result<()>,
+    ) -> Result<()> {
+        if self.pipelines.has_depth {
+            record(recording)?;
+            return self.draw_sky(recording);
+        }
+        self.draw_sky(recording)?;
+        record(recording)
     }
 
     /// Calls `record` for each run of draws of one pipeline, with that and its geometry bound.
@@ -242,7 +262,7 @@ impl Terrain {
         unsafe { self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline) };
     }
 
-    pub(super) fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
+    fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
         recording.scope("sky", |r| {
             // SAFETY: the pipeline outlives the frame; three vertices without input.
             unsafe {

@@ -95,7 +95,7 @@ pub struct Entry {
     pub variants: &'static [Variant],
     /// What can be set, with defaults.
     pub settings: &'static [Setting],
-    /// The most samples of a field, tiling included: it keeps something of each of them.
+    /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
     pub most_samples: u64,
     /// Whether it takes a land without samples ([`Field::land`]).
     pub takes_endless: bool,
@@ -113,7 +113,7 @@ impl Entry {
             return Err(format!("{name}: it needs samples, and this land has none: try {}", able.join(", ")));
         }
         if field.land().is_none() && w * h > self.most_samples {
-            return Err(format!("{name}: {w} x {h} samples, and it keeps something of each: at most {most_samples}"));
+            return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
         }
         Ok((self.build)(Arc::clone(field), settings))
     }

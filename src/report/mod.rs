@@ -3,6 +3,7 @@
 
 mod axis;
 mod bars;
+mod battery;
 mod chart;
 mod figures;
 mod html;
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use crate::bench::results::{self, Results};
+use crate::stress::Stress;
 use figures::Figures;
 
 /// Name of the page.
@@ -35,5 +37,13 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     }
     let path = folder.join(PAGE);
     results::save(&path, page::page(&results, &figures, folder).as_bytes())?;
+    Ok(path)
+}
+
+/// Draws the page of a stability battery's directory from its rows and returns its path.
+pub fn write_stress(folder: &Path) -> Result<PathBuf> {
+    let stress = Stress::read(folder)?;
+    let path = folder.join(PAGE);
+    results::save(&path, battery::page(&stress, folder).as_bytes())?;
     Ok(path)
 }

@@ -9,7 +9,7 @@ use crate::bench::rows::{Decision, Plan};
 use crate::bench::statistics::Estimate;
 
 /// A table whose cells are HTML already.
-fn table(columns: &[String], rows: &[Vec<String>], series: &[Option<String>]) -> String {
+pub fn table(columns: &[String], rows: &[Vec<String>], series: &[Option<String>]) -> String {
     let mut html = String::from("<table><thead><tr>");
     columns.iter().for_each(|column| html += &format!("<th scope=\"col\">{}</th>", escape(column)));
     html += "</tr></thead><tbody>";
@@ -51,6 +51,7 @@ const TIMES: &[Column] = &[
     ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
     ("below a pixel, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
     ("overdraw", |r| r.errors.as_ref()?.economy.as_ref()?.overdraw.map(number)),
+    ("past depth, a pixel", |r| r.errors.as_ref()?.economy.as_ref()?.passed.map(number)),
     ("held, %", |r| r.time.as_ref()?.held.map(|h| number(100.0 * h.settled))),
     ("mean tolerance, px", |r| r.time.as_ref()?.held.map(|h| number(h.tolerance_px.mean))),
     ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),

@@ -66,5 +66,6 @@ pub fn covered(picture: &image::RgbaImage) -> Vec<bool> {
 fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::RgbaImage> {
     let entry = lod::find("brute-force").expect("in the table");
     let mut technique: Box<dyn Technique> = (entry.build)(Arc::clone(field), &Settings::defaults(entry));
-    Ok(Scene { field, ..scene.clone() }.shoot(technique.as_mut(), view, 1)?.picture)
+    let plan = scene.plan.clone().with_manner(technique.manner());
+    Ok(Scene { field, plan: &plan, ..scene.clone() }.shoot(technique.as_mut(), view, 1)?.picture)
 }

@@ -1,6 +1,7 @@
 //! One field with one look on one device, drawn offscreen: pictures, draw lists and times for those who measure.
 
 pub mod capture;
+mod deep;
 pub mod holes;
 pub mod probed;
 
@@ -11,6 +12,7 @@ use anyhow::{Context, Result};
 
 use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::{Frames, Timing};
+use crate::gpu::pipelines::Pipelines;
 use crate::gpu::target::{self, Offscreen};
 use crate::gpu::terrain::Terrain;
 use crate::gpu::{Gpu, capture::Capture, floor::Floor, probe::Probe};
@@ -42,6 +44,8 @@ pub struct Stage {
     capture: Option<Capture>,
     probe: Option<Probe>,
     offscreen: Offscreen,
+    /// What draws with depth where the plan has none.
+    deep: Option<Pipelines>,
     gpu: Arc<Gpu>,
     field: Arc<Field>,
     plan: ScenePlan,
@@ -97,7 +101,11 @@ impl<'a> Scene<'a> {
     /// Makes it ready for a technique.
     pub fn stage(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
         let kept = technique.kept();
-        let formats = Offscreen::FORMATS;
+        let formats = Offscreen::formats(self.plan.has_depth());
+        let mut offscreen = Offscreen::new(self.gpu, size)?;
+        if self.plan.has_depth() {
+            offscreen.add_depth(self.gpu)?;
+        }
         let statistics = self.field.statistics();
         Ok(Stage {
             frames: Frames::new(self.gpu, self.plan.measured)?,
@@ -105,7 +113,8 @@ impl<'a> Scene<'a> {
             floor: None,
             capture: None,
             probe: None,
-            offscreen: Offscreen::new(self.gpu, size)?,
+            offscreen,
+            deep: None,
             gpu: Arc::clone(self.gpu),
             field: Arc::clone(self.field),
             plan: self.plan.clone(),
@@ -134,26 +143,31 @@ impl Stage {
         self.select(technique, view);
         let select_ms = ms(started);
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
+        self.frames.counts_passed = copy == Copy::PictureAndDepth;
         let mut recording = self.frames.begin()?;
         let uploading = Instant::now();
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         let upload_ms = ms(uploading);
         let recorded = Instant::now();
         self.terrain.select(&mut recording, &self.list)?;
-        target::begin(&recording, self.offscreen.attachment(), Some(self.offscreen.kept_depth()));
+        target::begin(&recording, self.offscreen.attachment(), deep::attachment(&self.plan, &self.offscreen));
         self.terrain.draw(&mut recording, &self.list)?;
         target::end(&recording);
         if copy != Copy::Nothing {
             self.offscreen.read_back(&recording);
         }
-        if copy == Copy::PictureAndDepth {
+        if copy == Copy::PictureAndDepth && self.plan.has_depth() {
             self.offscreen.read_back_depth(&recording);
         }
         let record_ms = ms(recorded);
         self.frames.submit(None, None)?;
         self.frames.finish().context("drawing")?;
         self.read_draws();
-        Ok(Times { frame_ms: ms(started), select_ms, upload_ms, record_ms, gpu: self.frames.timing.clone() })
+        let (frame_ms, gpu) = (ms(started), self.frames.timing.clone());
+        if copy == Copy::PictureAndDepth && !self.plan.has_depth() {
+            self.draw_deep(view)?;
+        }
+        Ok(Times { frame_ms, select_ms, upload_ms, record_ms, gpu })
     }
 
     /// Selects on the device if that can and nothing else is asked for.
@@ -189,6 +203,9 @@ impl Stage {
     /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed
     /// the depth that the last frame left. `view` is that frame's.
     pub fn draw_floor(&mut self, view: &View, copy: Copy) -> Result<Times> {
+        if !self.plan.has_depth() {
+            self.draw_deep(view)?;
+        }
         if self.floor.is_none() {
             let layout = self.terrain.set_layout();
             self.floor = Some(Floor::new(&self.gpu, &self.plan, layout, &self.offscreen)?);

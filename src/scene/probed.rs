@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::{Copy, Stage};
+use super::{Copy, Stage, deep};
 use crate::draw::{Draw, DrawList, Submission};
 use crate::gpu::clock::Clock;
 use crate::gpu::probe::{self, Counts, Measured, Piece, Probe};
@@ -145,7 +145,7 @@ impl Stage {
         steps.time("upload", || self.terrain.prepare(&mut recording, &frame, &self.list))?;
         steps.time("record", || {
             self.terrain.select(&mut recording, &self.list)?;
-            target::begin(&recording, self.offscreen.attachment(), Some(self.offscreen.kept_depth()));
+            target::begin(&recording, self.offscreen.attachment(), deep::attachment(&self.plan, &self.offscreen));
             self.terrain.draw_probed(&mut recording, &self.list, probe, pieces)?;
             target::end(&recording);
             self.offscreen.read_back(&recording);

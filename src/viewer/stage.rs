@@ -79,11 +79,12 @@ impl Stage {
     pub fn new(setup: &Setup, instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
         let surface = Surface::new(instance, window)?;
         let gpu = Gpu::for_window(instance, &setup.choice, |candidate| surface.is_shown_by(candidate))?;
-        let swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
-        let formats = swapchain.formats();
+        let mut swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
         let (entry, settings) = &setup.technique;
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
+        swapchain.set_depth(plan.has_depth())?;
+        let formats = swapchain.formats();
         let statistics = setup.field.statistics();
         Ok(Self {
             terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), technique.kept(), formats)?,
@@ -106,7 +107,13 @@ impl Stage {
     /// Changes the look: pipelines only.
     pub fn set_look(&mut self, setup: &Setup, look: &Look) -> Result<()> {
         let plan = plan(&self.gpu, setup, look, self.technique.as_ref())?;
-        self.terrain.replan(&plan, self.swapchain.formats())
+        let before = self.swapchain.formats();
+        self.swapchain.set_depth(plan.has_depth())?;
+        let formats = self.swapchain.formats();
+        if formats != before {
+            self.hud.reformat(formats)?;
+        }
+        self.terrain.replan(&plan, formats)
     }
 
     /// Changes the technique: its geometry, the slots' room, and pipelines for what it needs.
@@ -159,7 +166,7 @@ impl Stage {
         let frame = shot.look.frame(&setup.field, shot.view, self.range);
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         self.terrain.select(&mut recording, &self.list)?;
-        target::begin(&recording, image.attachment, Some(self.swapchain.depth()));
+        target::begin(&recording, image.attachment, self.swapchain.depth());
         self.terrain.draw(&mut recording, &self.list)?;
         let Painted { primitives, pixels_per_point, .. } = &mut overlay;
         self.hud.draw(&mut recording, shot.view.size, *pixels_per_point, primitives)?;

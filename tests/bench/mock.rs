@@ -115,6 +115,7 @@ impl Laboratory for Mock {
             hidden_share: 0.3,
             subpixel_share: 0.04,
             overdraw: Some(1.2),
+            passed: Some(1.1),
         });
         let multiple = Some(3.1 + case.tolerance_px / 10.0);
         errors.reference = Some(Reference { error_m: max * 9.0, delaunay: Some(5000), rtin: Some(21000), multiple });

@@ -13,7 +13,10 @@ use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::view::{Lens, View};
 
-use super::{LAWS, Subject, cases};
+use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::views;
+
+use super::cases;
 
 /// A law, how it is broken, words of the complaint, the field's name and the technique.
 type Breaker = (&'static str, &'static str, &'static str, &'static str, fn(&Arc<Field>) -> Box<dyn Technique>);
@@ -43,7 +46,7 @@ const BREAKERS: &[Breaker] = &[
         in_another_view(field, narrower)
     }),
     ("error within tolerance", "an ε a quarter too small", "px of", "131 × 67", |field| {
-        in_another_view(field, |view, _| cases::with_tolerance(view, 1.25 * view.tolerance.px))
+        in_another_view(field, |view, _| views::with_tolerance(view, 1.25 * view.tolerance.px))
     }),
     ("error within tolerance", "the paper's metric", "px of", "131 × 67", |field| {
         in_another_view(field, with_paper_metric)
@@ -59,7 +62,7 @@ const BREAKERS: &[Breaker] = &[
         changed(field, one_index_too_many)
     }),
     ("a wider tolerance never draws more", "the inverse", "triangles by tolerance", "131 × 67", |field| {
-        in_another_view(field, |view, _| cases::with_tolerance(view, 1.0 / view.tolerance.px))
+        in_another_view(field, |view, _| views::with_tolerance(view, 1.0 / view.tolerance.px))
     }),
     ("holes stay holes", "holes drawn", "nothing but holes", "holes", |field| Blocks::boxed(field, true, &[0])),
     ("neighbours within one level", "a jump of two levels", "meet", "noise", |field| {
@@ -72,13 +75,13 @@ fn every_law_fails_on_what_breaks_it() {
     let fields = cases::fields();
     for (law, breaker, complaint, field, build) in BREAKERS {
         let Some((_, field)) = fields.iter().find(|(name, _)| name == field) else { continue };
-        let views = cases::views(field);
+        let views = views::views(field);
         let mut technique = build(field);
         let mut subject = Subject { field, technique: &mut *technique, views: &views, time_s: 0.0 };
         let law = LAWS.iter().find(|l| l.name == *law).expect("a law of the table");
         match (law.check)(&mut subject) {
             Ok(()) => panic!("{}: not broken by {breaker}", law.name),
-            Err(why) => assert!(why.contains(complaint), "{}: {breaker}: {why}", law.name),
+            Err(broken) => assert!(broken.why.contains(complaint), "{}: {breaker}: {broken}", law.name),
         }
     }
     let (broken, laws): (BTreeSet<_>, BTreeSet<_>) =
@@ -99,7 +102,7 @@ fn unbroken_it_keeps_the_laws() {
         Blocks::boxed(field, true, &[0, 1]),
     ];
     for mut technique in whole {
-        let mut subject = Subject { field, technique: &mut *technique, views: &cases::views(field), time_s: 0.0 };
+        let mut subject = Subject { field, technique: &mut *technique, views: &views::views(field), time_s: 0.0 };
         // Clusters have blocks of several levels.
         let has_levels = subject.technique.manner().seams == Seams::Shared;
         for law in LAWS.iter().filter(|law| has_levels || law.name != "neighbours within one level") {
@@ -315,13 +318,13 @@ fn with_paper_metric(view: &View, _: &mut u32) -> View {
 
 fn every_other_time_coarser(view: &View, count: &mut u32) -> View {
     *count += 1;
-    cases::with_tolerance(view, if count.is_multiple_of(2) { 30.0 } else { 1.0 })
+    views::with_tolerance(view, if count.is_multiple_of(2) { 30.0 } else { 1.0 })
 }
 
 /// Once it has been far away it is coarser for good.
 fn coarser_since_far_away(view: &View, count: &mut u32) -> View {
     *count += u32::from(view.eye.y > 1e4);
-    cases::with_tolerance(view, if *count > 0 { 30.0 } else { 1.0 })
+    views::with_tolerance(view, if *count > 0 { 30.0 } else { 1.0 })
 }
 
 /// Blocks of 8 cells all over the field, holes too, their levels along a diagonal from a list.

@@ -1,64 +1,16 @@
 //! The laws that every technique keeps in every form, on every field, from every view. No device is needed.
 //!
-//! A law is a function over a field, a technique and views, so that [`broken`] can hold it against techniques
-//! that break it: each law fails on at least one of them.
+//! [`broken`] holds each law against techniques that break it.
 
 mod broken;
 pub(crate) mod cases;
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, Geometry, Source};
-use cuesta::height::Field;
-use cuesta::height::rtin;
-use cuesta::height::surface::{self, has_land, is_land};
-use cuesta::lod::{TECHNIQUES, Technique};
-use cuesta::measure::{geometric, in_view, watertight};
-use cuesta::view::View;
+use cuesta::lod::TECHNIQUES;
+use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::views;
 use rayon::prelude::*;
-
-/// A technique at work on a field, and where it is looked at from.
-struct Subject<'a> {
-    field: &'a Field,
-    technique: &'a mut dyn Technique,
-    views: &'a [(&'static str, View)],
-    /// The scene's time, seconds: it goes on from list to list.
-    time_s: f64,
-}
-
-/// A law: its name and its check, which says what breaks it.
-struct Law {
-    name: &'static str,
-    check: fn(&mut Subject) -> Result<(), String>,
-}
-
-const LAWS: &[Law] = &[
-    Law { name: "one surface", check: one_surface },
-    Law { name: "everything in sight is drawn", check: everything_in_sight },
-    Law { name: "error within tolerance", check: error_within_tolerance },
-    Law { name: "same view, same list", check: same_view_same_list },
-    Law { name: "teleport and return, same list", check: teleport_and_return },
-    Law { name: "lists fit the limits", check: lists_fit },
-    Law { name: "a wider tolerance never draws more", check: wider_never_more },
-    Law { name: "holes stay holes", check: holes_stay_holes },
-    Law { name: "neighbours within one level", check: neighbours_within_one_level },
-];
-
-/// Tolerances, pixels, widest last.
-const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
-
-/// What rounding may add to a screen error, relative. Heights are compared as the f32 they are drawn with and
-/// everything else is f64, whose rounding over a projection stays far below this.
-const SLACK: f64 = 1e-9;
-
-/// In so many frames of one view everything settles: a few for each tile of the largest field.
-const MOST_FRAMES: usize = 5000;
-
-/// How far away is elsewhere, whatever the field, metres.
-const ELSEWHERE_M: f64 = 1e9;
 
 /// All laws at once, so that each technique is prepared once: a failure names the law, the technique with its
 /// settings, the field and the view.
@@ -70,218 +22,14 @@ fn every_technique_keeps_every_law() {
     let broken: Vec<String> = pairs
         .par_iter()
         .flat_map_iter(|&((field_name, field), form)| {
-            let views = cases::views(field);
+            let views = views::views(field);
             let mut technique = (form.entry.build)(Arc::clone(field), &form.settings);
             let mut subject = Subject { field, technique: &mut *technique, views: &views, time_s: 0.0 };
-            let has_tiles = ["geomipmap", "smooth-tiles"].contains(&form.entry.name);
-            let kept = |law: &&Law| has_tiles || law.name != "neighbours within one level";
-            let failed =
-                LAWS.iter().filter(kept).filter_map(move |law| Some((law.name, (law.check)(&mut subject).err()?)));
+            let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
+            let failed = laws.filter_map(move |law| Some((law.name, (law.check)(&mut subject).err()?)));
             failed.map(|(law, why)| format!("{law}: {} on {field_name}: {why}", form.name)).collect::<Vec<_>>()
         })
         .collect();
     assert!(broken.is_empty(), "{} failures, the first:\n{}", broken.len(), broken[..broken.len().min(12)].join("\n"));
     println!("{} forms × {} fields × {} laws", forms.len(), fields.len(), LAWS.len());
-}
-
-impl Subject<'_> {
-    /// The list of a view once the technique has settled in it.
-    fn select(&mut self, view: &View) -> DrawList {
-        for _ in 0..MOST_FRAMES {
-            let list = self.select_once(view);
-            if self.technique.is_settled() {
-                return list;
-            }
-        }
-        panic!("not settled after {MOST_FRAMES} frames of one view");
-    }
-
-    /// The next list of a view, a second after the last one.
-    fn select_once(&mut self, view: &View) -> DrawList {
-        let mut list = DrawList::default();
-        self.time_s += 1.0;
-        self.technique.select(&View { time_s: self.time_s, ..*view }, &mut list);
-        list
-    }
-
-    fn drawn(&mut self, view: &View) -> Vec<Drawn> {
-        let list = self.select(view);
-        expand::triangles(self.field, &Frame::placing(self.field, view), self.technique.resident(), &list)
-    }
-
-    /// Runs a check in every view and names the view that breaks it.
-    fn in_every_view(&mut self, check: impl Fn(&mut Self, &View) -> Result<(), String>) -> Result<(), String> {
-        self.views.iter().try_for_each(|(name, view)| check(self, view).map_err(|why| format!("{name}: {why}")))
-    }
-}
-
-/// No crack or T-junction, covered once, every triangle faces up, no gap in sight. With skirts: every gap is hidden.
-fn one_surface(subject: &mut Subject) -> Result<(), String> {
-    let [w, h] = subject.field.size().map(i64::from);
-    subject.in_every_view(|subject, view| {
-        let whole = 2 * (w - 1) * (h - 1);
-        let all_land = subject.field.holes().count() == 0 && cases::sees_everything(subject.field, view);
-        // As it arrives, and once it has settled.
-        [Subject::select_once, Subject::select].iter().try_for_each(|select| {
-            let (list, seams) = (select(subject, view), subject.technique.manner().seams);
-            let proof = watertight::prove_list(subject.field, view, seams, subject.technique.resident(), &list)
-                .map_err(|why| why.to_string())?;
-            ensure(!all_land || proof.doubled_area == whole, || format!("area {} of {whole}", proof.doubled_area))
-        })
-    })
-}
-
-/// Every sample in the picture lies in a drawn triangle: the prover's last step another way, by exact
-/// projection instead of boxes, and by points instead of areas.
-fn everything_in_sight(subject: &mut Subject) -> Result<(), String> {
-    let land = samples_of_land(subject.field);
-    subject.in_every_view(|subject, view| {
-        let [w, h] = subject.field.size();
-        let mut covered = vec![false; (w * h) as usize];
-        for triangle in subject.drawn(view).iter().filter(|t| surface::doubled_area(&t.corners) > 0) {
-            surface::visit_samples(&triangle.corners, |x, z, _| covered[(z * w + x) as usize] = true);
-        }
-        let open = |&k: &u32| !covered[k as usize] && in_view(view, subject.field.world(k % w, k / w));
-        let missing = land.iter().find(|&k| open(k));
-        missing.map_or(Ok(()), |k| Err(format!("sample ({}, {}) is in view and not drawn", k % w, k / w)))
-    })
-}
-
-/// Samples that are corners of a triangle with data.
-fn samples_of_land(field: &Field) -> Vec<u32> {
-    let [w, h] = field.size();
-    let mut land = vec![false; (w * h) as usize];
-    let cells = (0..h as i32 - 1).flat_map(|j| (0..w as i32 - 1).map(move |i| (i, j)));
-    for [x, z] in cells.flat_map(|(i, j)| rtin::cell(i, j)).filter(|t| is_land(field, t)).flatten() {
-        land[(z as u32 * w + x as u32) as usize] = true;
-    }
-    (0..w * h).filter(|&k| land[k as usize]).collect()
-}
-
-/// No sample in view is drawn further away than the tolerance says, with the certified metric.
-fn error_within_tolerance(subject: &mut Subject) -> Result<(), String> {
-    if !subject.technique.keeps_tolerance() {
-        return Ok(());
-    }
-    subject.in_every_view(|subject, view| {
-        let mut last = None;
-        TOLERANCES_PX.iter().try_for_each(|&px| {
-            let view = cases::with_tolerance(view, px);
-            let list = subject.select(&view);
-            if last.as_ref().is_some_and(|last| same_list(last, &list)) {
-                // The same triangles kept a narrower tolerance already.
-                return Ok(());
-            }
-            let errors = geometric::errors(subject.field, &view, subject.technique.resident(), &list);
-            last = Some(list);
-            let max = errors.screen_px.max;
-            ensure(max <= px * (1.0 + SLACK), || format!("{max} px of {px}, at {:?}", errors.screen_at))
-        })
-    })
-}
-
-fn same_view_same_list(subject: &mut Subject) -> Result<(), String> {
-    subject.in_every_view(|subject, view| {
-        let (first, second) = (subject.select(view), subject.select(view));
-        ensure(same_list(&first, &second), || "two lists in a row differ".into())
-    })
-}
-
-/// A room with uploads may keep its geometry elsewhere after a journey: then what is drawn must be the same.
-fn teleport_and_return(subject: &mut Subject) -> Result<(), String> {
-    let views = subject.views;
-    let uploads = subject.technique.limits().upload_bytes > 0;
-    for ((name, view), (_, away)) in views.iter().zip(views.iter().skip(3).chain(views)) {
-        // Both times it is a teleport.
-        let elsewhere = View { eye: view.eye + glam::DVec3::X * ELSEWHERE_M, ..*view };
-        subject.select_once(&elsewhere);
-        let list = subject.select(view);
-        let drawn = if uploads { sorted(subject.drawn(view)) } else { Vec::new() };
-        subject.select(away);
-        subject.select_once(&elsewhere);
-        let list_again = subject.select(view);
-        let same = if uploads { drawn == sorted(subject.drawn(view)) } else { same_list(&list, &list_again) };
-        ensure(same, || format!("{name}: another list after a journey"))?;
-    }
-    Ok(())
-}
-
-fn same_list(a: &DrawList, b: &DrawList) -> bool {
-    let bytes = |list: &DrawList| bytemuck::cast_slice::<_, u8>(&list.streamed.vertices).to_vec();
-    (&a.draws, &a.instances, a.submission) == (&b.draws, &b.instances, b.submission)
-        && a.streamed.indices == b.streamed.indices
-        && bytes(a) == bytes(b)
-}
-
-fn sorted(triangles: Vec<Drawn>) -> Vec<[(i32, i32, u32); 3]> {
-    let mut sorted: Vec<_> = triangles.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect();
-    sorted.sort_unstable();
-    sorted
-}
-
-/// A list is within the technique's limits, and its ranges within what they address.
-fn lists_fit(subject: &mut Subject) -> Result<(), String> {
-    subject.in_every_view(|subject, view| {
-        let list = subject.select(view);
-        let (limits, size) = (subject.technique.limits(), list.size());
-        ensure(limits.hold(&size), || format!("{size:?} exceeds {limits:?}"))?;
-        let resident = subject.technique.resident();
-        let addressed = |source| if source == Source::Streamed { &list.streamed } else { resident };
-        list.draws.iter().try_for_each(|draw| {
-            let fits = in_range(addressed(draw.source), draw) && draw.instances.end as usize <= list.instances.len();
-            ensure(fits, || format!("{draw:?} reaches outside"))
-        })
-    })
-}
-
-fn in_range(geometry: &Geometry, draw: &Draw) -> bool {
-    let vertices = if draw.source == Source::Lattice { geometry.lattice.len() } else { geometry.vertices.len() };
-    let indices = geometry.indices.get(draw.indices.start as usize..draw.indices.end as usize);
-    indices.is_some_and(|indices| indices.iter().all(|&k| ((k + draw.first_vertex) as usize) < vertices))
-}
-
-fn wider_never_more(subject: &mut Subject) -> Result<(), String> {
-    subject.in_every_view(|subject, view| {
-        let counts = TOLERANCES_PX.map(|px| subject.select(&cases::with_tolerance(view, px)).triangles());
-        ensure(counts.is_sorted_by(|a, b| a >= b), || format!("triangles by tolerance: {counts:?}"))
-    })
-}
-
-/// No instance of only holes is drawn. (That all land is drawn is the law of everything in sight.)
-fn holes_stay_holes(subject: &mut Subject) -> Result<(), String> {
-    subject.in_every_view(|subject, view| {
-        let mut boxes: HashMap<u32, [i32; 4]> = HashMap::new();
-        for triangle in subject.drawn(view) {
-            let [west, north, east, south] = boxes.entry(triangle.instance).or_insert([i32::MAX, i32::MAX, 0, 0]);
-            for corner in triangle.corners {
-                (*west, *north) = (corner.x.min(*west), corner.z.min(*north));
-                (*east, *south) = (corner.x.max(*east), corner.z.max(*south));
-            }
-        }
-        boxes.values().try_for_each(|&[west, north, east, south]| {
-            let land = has_land(subject.field, [west, north], [east, south]);
-            ensure(land, || format!("nothing but holes in ({west}, {north}) to ({east}, {south})"))
-        })
-    })
-}
-
-/// Blocks side by side are within one level of each other.
-fn neighbours_within_one_level(subject: &mut Subject) -> Result<(), String> {
-    subject.in_every_view(|subject, view| {
-        let list = subject.select(view);
-        let level_at: HashMap<_, _> = list.instances.iter().map(|block| (block.origin, block.level)).collect();
-        list.instances.iter().try_for_each(|block| {
-            let [x, z] = block.origin;
-            let side = (block.cells << block.shift) as i32;
-            let neighbours = [[x + side, z], [x, z + side]];
-            neighbours.iter().filter_map(|at| level_at.get(at)).try_for_each(|level| {
-                let apart = level.abs_diff(block.level);
-                ensure(apart <= 1, || format!("levels {} and {level} meet at the block at {:?}", block.level, [x, z]))
-            })
-        })
-    })
-}
-
-fn ensure(holds: bool, why: impl FnOnce() -> String) -> Result<(), String> {
-    if holds { Ok(()) } else { Err(why()) }
 }

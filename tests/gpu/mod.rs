@@ -8,6 +8,7 @@ mod driven;
 mod golden;
 mod layout;
 mod neck;
+mod painter;
 mod plan;
 mod skirts;
 mod soak;

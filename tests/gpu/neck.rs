@@ -92,6 +92,7 @@ impl Technique for Explicit {
             vertices: self.mesh.vertices.len(),
             indices: self.mesh.indices.len(),
             upload_bytes: bytes,
+            ..Limits::default()
         }
     }
 

@@ -9,6 +9,7 @@ use cuesta::lod::Technique;
 use cuesta::plan::{Look, ScenePlan};
 use cuesta::scene::holes::{Truth, skirts as skirt_pixels};
 use cuesta::scene::{Copy, Scene};
+use cuesta::stress::views;
 use cuesta::view::View;
 
 use super::{aslant, difference, on_device, shoot, technique};
@@ -92,7 +93,7 @@ fn no_hole_pixels_on_any_field_of_the_laws() {
             let look = Look::default();
             let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
-            let views = cases::views(&field).into_iter().map(|(what, view)| (what, cases::with_tolerance(&view, 4.0)));
+            let views = views::views(&field).into_iter().map(|(what, view)| (what, views::with_tolerance(&view, 4.0)));
             let truths: Vec<_> = views.map(|(what, view)| (what, view, Truth::new(&scene, &view).unwrap())).collect();
             for morph in ["morph=off", "morph=on"] {
                 let mut technique = skirted(&field, morph, 1.0);

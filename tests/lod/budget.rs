@@ -1,85 +1,11 @@
 //! The budget controller against made-up costs: loads that step, climb, spike and swing, curves from nearly flat to
 //! slopes of 10⁴ and stairs, late and noisy costs.
 
-use std::collections::VecDeque;
-
-use cuesta::lod::budget::{Controller, Target};
-
-/// Least and greatest tolerance, pixels.
-const RANGE_PX: [f64; 2] = [1.0 / 64.0, 256.0];
-/// What is held, in the target's unit.
-const COST: f64 = 1e5;
-/// The frame at which loads change: everything has settled.
-const EVENT: usize = 60;
-
-/// A made-up renderer.
-struct Load<'a> {
-    /// Cost by tolerance.
-    curve: &'a dyn Fn(f64) -> f64,
-    /// What it is multiplied by, by frame.
-    factor: &'a dyn Fn(usize) -> f64,
-    /// How many frames after a frame its cost is known: 1 is before the next one.
-    delay: usize,
-    /// Costs are off by up to this share.
-    noise: f64,
-    /// Of the noise.
-    seed: u64,
-}
-
-/// What a frame was drawn with, and what it cost over the target, noise left out.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    px: f64,
-    cost: f64,
-}
-
-impl Load<'_> {
-    fn fly(&self, target: Target, first_px: f64, frames: usize) -> Vec<Frame> {
-        let mut controller = Controller::new(target, first_px, RANGE_PX);
-        let mut state = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1);
-        let mut late = VecDeque::new();
-        let mut fly = |k: usize| {
-            let px = controller.tolerance_px();
-            let cost = (self.curve)(px) * (self.factor)(k);
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            let share = (state >> 11) as f64 / (1u64 << 53) as f64;
-            late.push_back((px, cost * (1.0 + self.noise * (2.0 * share - 1.0))));
-            if late.len() >= self.delay {
-                let (px, cost) = late.pop_front().expect("one at least");
-                controller.learn(px, cost);
-            }
-            Frame { px, cost: cost / target.cost() }
-        };
-        (0..frames).map(&mut fly).collect()
-    }
-}
-
-/// How much more than the target anything cost once no more than a fifth was too much.
-fn overshoot(frames: &[Frame]) -> f64 {
-    let reached = frames.iter().position(|frame| frame.cost <= 1.2).unwrap_or(0);
-    frames[reached..].iter().map(|frame| frame.cost - 1.0).fold(0.0, f64::max)
-}
-
-/// Frames until all are within a share of the target.
-fn settling(frames: &[Frame], share: f64) -> usize {
-    frames.iter().rposition(|frame| (frame.cost - 1.0).abs() > share).map_or(0, |k| k + 1)
-}
-
-fn constant(_: usize) -> f64 {
-    1.0
-}
-
-/// Costs COST at 1 px.
-fn power(slope: f64) -> impl Fn(f64) -> f64 {
-    move |px: f64| (COST * px.powf(-slope)).clamp(10.0, 1e8)
-}
-
-fn step(factor: f64) -> impl Fn(usize) -> f64 {
-    move |k| if k < EVENT { 1.0 } else { factor }
-}
+use cuesta::lod::budget::{RANGE_PX, Target};
+use cuesta::stress::plants::{COST, EVENT, Load, constant, overshoot, power, settling, step};
 
 /// Starts too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px, load)`.
-type Event = (&'static str, usize, f64, Box<dyn Fn(usize) -> f64>);
+type Event = (&'static str, usize, f64, Box<dyn Fn(usize) -> f64 + Sync>);
 
 fn events() -> Vec<Event> {
     vec![
@@ -221,7 +147,7 @@ fn slow_changes_are_followed() {
     for delay in [1, 2, 3] {
         let ramp = |k: usize| 1.02f64.powi(k.clamp(EVENT, 2 * EVENT) as i32 - EVENT as i32);
         let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
-        for (name, factor) in [("ramp", &ramp as &dyn Fn(usize) -> f64), ("swing", &swing)] {
+        for (name, factor) in [("ramp", &ramp as &(dyn Fn(usize) -> f64 + Sync)), ("swing", &swing)] {
             let load = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 };
             let frames = load.fly(Target::Triangles(COST), 1.0, 240);
             let worst = frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max);

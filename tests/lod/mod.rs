@@ -10,6 +10,7 @@ mod smooth_tiles;
 mod sphere_tree;
 mod strips;
 mod strips_cave;
+mod strips_guard;
 mod strips_order;
 
 use std::sync::Arc;

@@ -11,7 +11,10 @@
 //!   refining does, the finer one coarsening does not. Any number of neighbours may change in one frame;
 //! - the *finer* tile's border is modified, as in the figures (§2.2 says the other one's);
 //! - a tile has one chunk, not one and four borders: vertices of a side also know the level after the next, and where a
-//!   neighbour's level changes the border has other indices. Nothing is rebuilt for a neighbour;
+//!   neighbour's level changes the border has other indices. Nothing is rebuilt for a neighbour. Five chunks would
+//!   have to build two borders anew for each tile that changes level (600 frames of five paths over real land, 2 px):
+//!   66 % more bytes uploaded with tiles of 9, 39 % with 17 and 20 % with 33; five draws a tile instead of two;
+//!   and 4n vertices more in a tile of n × n cells;
 //! - with the metric `certified` a morph gives way to the bound whatever the clock says, and it begins only where the
 //!   next level keeps the bound. Only where a refinement waits for its chunk may the bound be exceeded: the list says
 //!   in how many tiles;

@@ -20,10 +20,11 @@ use super::certified::{Certified, bounds};
 use super::footprint::Footprint;
 use super::measure::Errors;
 use super::pages::{Gaze, Grid, Pages, Row};
+use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::walk::{Ground, Stream, Worker};
-use super::{MOST_PAGES, MOST_TRIANGLES, WIDENING, turn_round};
+use super::{MOST_PAGES, MOST_TRIANGLES, WIDENING};
 use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
@@ -42,7 +43,7 @@ pub struct CaveStrips {
     splits: Splits,
     /// One a row of pages.
     rows: Vec<RowWorker>,
-    is_back_to_front: bool,
+    sequence: Sequence,
     limits: Limits,
     nothing: Geometry,
 }
@@ -75,7 +76,7 @@ impl CaveStrips {
             pages: Pages::none(grid),
             splits: Splits::new(grid),
             rows: Vec::new(),
-            is_back_to_front: settings.word("order") == "back",
+            sequence: Sequence::of(settings.word("order")),
             limits,
             nothing: Geometry::default(),
         }
@@ -104,7 +105,7 @@ impl CaveStrips {
         [self.cave.floor(), self.cave.ceiling()]
             .into_iter()
             .zip(&self.errors)
-            .all(|(field, errors)| Certified::new(field, errors, &self.pages, view, most).split(&mut self.splits))
+            .all(|(field, errors)| Certified::new(field, errors, &self.pages, [view; 2], most).split(&mut self.splits))
     }
 
     /// Walks the rows of a frame; `false` if they do not fit.
@@ -133,9 +134,7 @@ impl CaveStrips {
             let (indices, instances) = (first..list.streamed.indices.len() as u32, batch..batch + 1);
             list.draws.push(Draw { source, topology, indices, instances, first_vertex: 0 });
         }
-        if self.is_back_to_front {
-            turn_round(list);
-        }
+        self.sequence.arrange(list);
     }
 }
 

@@ -2,13 +2,14 @@
 //!
 //! The paper prefers triangles of one size on the screen to a bound, and says that any selection of vertices may take
 //! the place of its level function (§4.1). This one looks at squares from the page down, so that its work grows with
-//! what is drawn; squares out of sight are not split.
+//! what is drawn. Squares out of sight are split only in a band around the picture ([`guarded`]): without it, what a
+//! turn of the head brings into sight goes from its coarsest level to its own at once.
 
 use super::measure::Errors;
 use super::pages::Pages;
 use super::splits::Splits;
 use crate::height::Field;
-use crate::view::{Aabb, Allowance, Containment, Frustum, View};
+use crate::view::{Aabb, Allowance, Containment, Frustum, Lens, View};
 
 /// A view of a measured field.
 pub struct Certified<'a> {
@@ -21,9 +22,10 @@ pub struct Certified<'a> {
 }
 
 impl<'a> Certified<'a> {
-    /// Under the view's tolerance. It stops at `most` split squares.
-    pub fn new(field: &'a Field, errors: &'a Errors, pages: &'a Pages, view: &View, most: usize) -> Self {
-        Self { field, errors, pages, frustum: view.frustum(), allowance: view.allowance(), most }
+    /// Under the view's tolerance, in the sight of `seen`: the view, or one that sees more. It stops at `most` split
+    /// squares.
+    pub fn new(field: &'a Field, errors: &'a Errors, pages: &'a Pages, [view, seen]: [&View; 2], most: usize) -> Self {
+        Self { field, errors, pages, frustum: seen.frustum(), allowance: view.allowance(), most }
     }
 
     /// Fills an empty set; `false` if there would be too many.
@@ -63,6 +65,16 @@ impl<'a> Certified<'a> {
             }
         }
     }
+}
+
+/// The view with a picture that is wider and higher by a band on each side, in parts of its width and its height.
+pub fn guarded(view: &View, band: f64) -> View {
+    let wider = 1.0 + 2.0 * band;
+    let lens = match view.lens {
+        Lens::Perspective { fov_x } => Lens::Perspective { fov_x: 2.0 * (wider * (fov_x / 2.0).tan()).atan() },
+        Lens::Orthographic { width, far } => Lens::Orthographic { width: wider * width, far },
+    };
+    View { lens, ..*view }
 }
 
 /// The box around a square, its part outside the field left out, metres.

@@ -13,11 +13,16 @@
 //!   [`certified`]), the set closed over squares that touch ([`splits`]);
 //! - shapes are combined where finer quads are on several sides of one: the published five are not enough there;
 //! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
-//!   one direction. `order=back` turns the list round: both orders are the same triangles;
+//!   one direction. `order=back` turns the list round: both orders are the same triangles. `order=painter` draws it so
+//!   without a depth buffer, and the picture is the same to the pixel;
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
 //!   row and column of pages, where some rays go against the walk ([`order`]);
 //! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
 //!   paper's variant in three dimensions needs, and a bound would be spent on it;
+//! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
+//!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
+//!   3.0 px and the 99.9th percentile from 26 px to 1.05 px, for a quarter more triangles (282 k to 351 k); a band
+//!   without end has the same jumps and 371 k;
 //! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
 //!
 //! The surface is made of the samples at quads' corners and middles; plain quads have the crate's alternating
@@ -33,6 +38,7 @@ pub mod join;
 pub mod measure;
 pub mod order;
 pub mod pages;
+pub mod sequence;
 pub mod shapes;
 pub mod splits;
 pub mod table;
@@ -44,17 +50,18 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
-use self::certified::{Certified, bounds};
+use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
 use self::join::{join, starts};
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
+use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
+use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::view::{Containment, View};
 
@@ -87,9 +94,15 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "order",
-            values: Values::Words(&["front", "back"]),
+            values: Values::Words(Sequence::WORDS),
             default: "front",
-            about: "whether the nearest triangle comes first, or the furthest",
+            about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer; or in no order",
+        },
+        Setting {
+            key: "guard",
+            values: Values::Number(0.0, 1000.0),
+            default: "0.25",
+            about: "width of a band around the picture, in parts of it, as fine for level=certified as the picture",
         },
         Setting {
             key: "edge",
@@ -119,8 +132,10 @@ struct SortedStrips {
     workers: Vec<Worker>,
     /// Length of a triangle's side, tolerances, if levels are uniform.
     edge: Option<f64>,
+    /// Width of the band around the picture that is as fine as the picture, pictures.
+    guard: f64,
     blends: bool,
-    is_back_to_front: bool,
+    sequence: Sequence,
     is_serial: bool,
     limits: Limits,
     nothing: Geometry,
@@ -146,8 +161,9 @@ impl SortedStrips {
             splits: Splits::new(grid),
             workers: Vec::new(),
             edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
+            guard: settings.number("guard"),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
-            is_back_to_front: settings.word("order") == "back",
+            sequence: Sequence::of(settings.word("order")),
             is_serial: settings.variant() == Some("serial"),
             limits,
             nothing: Geometry::default(),
@@ -210,9 +226,10 @@ impl SortedStrips {
             return self.walk(&levels, gaze, rows, workers);
         }
         self.splits.clear();
+        let seen = guarded(view, self.guard);
         // A split square has at least six triangles more.
         let most = self.limits.indices / 18 + 1;
-        let certified = Certified::new(&self.field, &self.errors, &self.pages, view, most);
+        let certified = Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most);
         if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
     }
 
@@ -239,20 +256,8 @@ impl SortedStrips {
             list.draws.push(Draw { source, topology, indices: first..end, instances, first_vertex: 0 });
             first = end;
         }
-        if self.is_back_to_front {
-            turn_round(list);
-        }
+        self.sequence.arrange(list);
     }
-}
-
-/// Turns the order of all triangles round.
-fn turn_round(list: &mut DrawList) {
-    let count = list.streamed.indices.len() as u32;
-    list.streamed.indices.reverse();
-    // Each triangle's own three too: they turn as before.
-    list.streamed.indices.chunks_exact_mut(3).for_each(|t| t.reverse());
-    list.draws.reverse();
-    list.draws.iter_mut().for_each(|draw| draw.indices = count - draw.indices.end..count - draw.indices.start);
 }
 
 impl Technique for SortedStrips {
@@ -286,6 +291,10 @@ impl Technique for SortedStrips {
 
     fn keeps_tolerance(&self) -> bool {
         self.edge.is_none()
+    }
+
+    fn manner(&self) -> Manner {
+        Manner { hiding: self.sequence.hiding(), ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -1,0 +1,231 @@
+//! `cuesta stress`: the stability battery.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use indicatif::ProgressBar;
+
+use super::{Common, Outcome, report};
+use crate::height::save::replace;
+use crate::stress::{self, Case, Eye, Finding, Kind, Row, SCHEMA, Stress, Trial, jitter, rows, saved, stiff};
+
+/// Where counter-examples go if nothing else is said.
+const FOLDER: &str = "cuesta-stress";
+
+/// Arguments.
+#[derive(Args, Debug)]
+pub struct StressArgs {
+    /// Only this family: data, position, view, time, arithmetic, stiff or file; may be repeated.
+    #[arg(long, value_name = "F")]
+    pub family: Vec<String>,
+    /// Only cases with this in their name; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub case: Vec<String>,
+    /// Only this technique, or technique:variant; may be repeated.
+    #[arg(long, value_name = "T")]
+    pub technique: Vec<String>,
+    /// Folder for stress.json, index.html and pictures; counter-examples go to cuesta-stress if it is not given.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Draw nothing on a device.
+    #[arg(long)]
+    pub no_device: bool,
+    /// Say which cases there are.
+    #[arg(long)]
+    pub list: bool,
+}
+
+/// Runs the subcommand.
+pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
+    let cases = chosen(args)?;
+    if args.list {
+        cases.iter().for_each(|case| println!("{}: {}", case.family, case.name));
+        return Ok(Outcome::Done);
+    }
+    let mut trials = stress::trials(&cases, &args.technique).map_err(anyhow::Error::msg)?;
+    if !args.technique.is_empty() {
+        trials.retain(|trial| !matches!(trial.case.kind, Kind::Alone(..)) || !args.family.is_empty());
+    }
+    let mut device = Device::open(common, args)?;
+    let bar = progress(common, &trials, device.eye().is_some());
+    let found = stress::run(&trials, device.eye(), |trial| {
+        bar.set_message(format!("{}: {}, {}", trial.case.family, trial.case.name, trial.technique()));
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    let folder = args.out.clone().unwrap_or_else(|| FOLDER.into());
+    let mut rows = Vec::new();
+    for (trial, findings) in trials.iter().zip(&found) {
+        for finding in findings {
+            rows.push(row(&folder, trial, finding, device.eye())?);
+        }
+    }
+    let (name, messages) = device.close();
+    rows.extend(name.is_some().then(|| validation(&messages)).filter(|_| common.validate));
+    let program = format!("cuesta {}", env!("CARGO_PKG_VERSION"));
+    let mut stress = Stress { schema: SCHEMA, program, device: name, cases: rows, pictures: Vec::new() };
+    if let Some(folder) = &args.out {
+        keep(folder, &mut stress)?;
+    }
+    say(common, &stress)?;
+    let [_, failed] = stress.counts();
+    Ok(if failed == 0 { Outcome::Done } else { Outcome::LimitMissed })
+}
+
+/// The cases asked for.
+fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
+    let families: Vec<_> = stress::FAMILIES.iter().filter_map(|cases| Some(cases.first()?.family)).collect();
+    if let Some(unknown) = args.family.iter().find(|family| !families.contains(&family.as_str())) {
+        bail!("--family {unknown}: expected one of {}", families.join(", "));
+    }
+    let is_wanted = |case: &&Case| {
+        let of_family = args.family.is_empty() || args.family.iter().any(|family| family == case.family);
+        of_family && (args.case.is_empty() || args.case.iter().any(|part| case.name.contains(part)))
+    };
+    let cases: Vec<_> = stress::cases().filter(is_wanted).collect();
+    if cases.is_empty() {
+        bail!("--case {}: no such case, see cuesta stress --list", args.case.join(", "));
+    }
+    Ok(cases)
+}
+
+fn progress(common: &Common, trials: &[Trial], draws: bool) -> ProgressBar {
+    let drawn = trials.iter().filter(|trial| draws && trial.form.is_some()).count();
+    let bar = if common.quiet || common.json { ProgressBar::hidden() } else { ProgressBar::no_length() };
+    bar.set_length((trials.len() + drawn) as u64);
+    bar
+}
+
+fn row(folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Result<Row> {
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let files = if finding.passes() {
+        Vec::new()
+    } else {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        saved::counter_example(folder, trial, finding, eye)?
+    };
+    Ok(Row {
+        family: trial.case.family.to_string(),
+        name: trial.case.name.to_string(),
+        technique: trial.technique(),
+        check: finding.check.to_string(),
+        value: finite(finding.value),
+        limit: finding.limit.and_then(finite),
+        pass: finding.passes(),
+        why: finding.broken.as_ref().map(ToString::to_string).or_else(|| finding.why.clone()),
+        repeat: saved::command(trial),
+        saved: files.iter().map(|file| file.display().to_string()).collect(),
+    })
+}
+
+fn validation(messages: &[String]) -> Row {
+    Row {
+        family: "arithmetic".to_string(),
+        name: "all pictures".to_string(),
+        technique: "device".to_string(),
+        check: "validation messages".to_string(),
+        value: Some(messages.len() as f64),
+        limit: Some(0.0),
+        pass: messages.is_empty(),
+        why: messages.first().cloned(),
+        repeat: "cuesta stress --validate".to_string(),
+        saved: Vec::new(),
+    }
+}
+
+/// Writes the rows, the jitter maps and the page.
+fn keep(folder: &Path, stress: &mut Stress) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    if stress.cases.iter().any(|row| row.name.starts_with("jitter")) {
+        stress.pictures.extend(jitter::save_maps(folder)?);
+    }
+    if stress.cases.iter().any(|row| row.family == "stiff") {
+        stress.pictures.extend(stiff::save_regions(folder)?);
+    }
+    let path = folder.join(rows::FILE);
+    replace(&path, |out| Ok(serde_json::to_writer_pretty(out, stress)?)).with_context(|| path.display().to_string())?;
+    crate::report::write_stress(folder)?;
+    Ok(())
+}
+
+fn say(common: &Common, stress: &Stress) -> Result<()> {
+    if common.json {
+        return report::print(common, stress);
+    }
+    let [passed, failed] = stress.counts();
+    if !common.quiet {
+        stress.cases.iter().for_each(|row| println!("{}", line(row)));
+    }
+    stress.cases.iter().filter(|row| !row.pass && common.quiet).for_each(|row| println!("{}", line(row)));
+    println!("{passed} checks passed, {failed} failed");
+    Ok(())
+}
+
+fn line(row: &Row) -> String {
+    let number = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.6}"));
+    let number = |value| {
+        let text = number(value);
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
+    };
+    let verdict = match (row.limit, row.pass) {
+        (None, true) => "told",
+        (_, true) => "pass",
+        (_, false) => "FAIL",
+    };
+    let Row { family, name, technique, check, value, limit, why, .. } = row;
+    let why = why.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+    format!("{verdict}  {family}: {name}, {technique}: {check}: {} of {}{why}", number(*value), number(*limit))
+}
+
+/// The device that draws, if there is one and it is wanted.
+#[cfg(feature = "vulkan")]
+struct Device(Option<(String, stress::device::DeviceEye)>);
+
+#[cfg(feature = "vulkan")]
+impl Device {
+    fn open(common: &Common, args: &StressArgs) -> Result<Self> {
+        if args.no_device {
+            return Ok(Self(None));
+        }
+        match super::render::open(common, false) {
+            Ok(gpu) => {
+                let name = gpu.candidate.name.clone();
+                Ok(Self(Some((name, stress::device::DeviceEye::new(gpu)))))
+            }
+            Err(error) if common.device.is_some() || common.validate => Err(error),
+            Err(error) => {
+                report::warn(common, &format!("no pictures: {error:#}"));
+                Ok(Self(None))
+            }
+        }
+    }
+
+    fn eye(&mut self) -> Option<&mut dyn Eye> {
+        self.0.as_mut().map(|(_, eye)| eye as &mut dyn Eye)
+    }
+
+    /// Its name, and validation messages.
+    fn close(self) -> (Option<String>, Vec<String>) {
+        self.0.map_or((None, Vec::new()), |(name, eye)| (Some(name), eye.close()))
+    }
+}
+
+/// There is none in this build.
+#[cfg(not(feature = "vulkan"))]
+struct Device;
+
+#[cfg(not(feature = "vulkan"))]
+impl Device {
+    fn open(_: &Common, _: &StressArgs) -> Result<Self> {
+        Ok(Self)
+    }
+
+    fn eye(&mut self) -> Option<&mut dyn Eye> {
+        None
+    }
+
+    fn close(self) -> (Option<String>, Vec<String>) {
+        (None, Vec::new())
+    }
+}

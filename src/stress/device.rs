@@ -1,0 +1,160 @@
+//! What a device draws in the battery: no sky through land, the triangles that the list says, the same bytes twice.
+
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+
+use super::laws::Broken;
+use super::{Case, Eye, Finding, Flight, Form, Kind, Land};
+use crate::draw::expand;
+use crate::draw::layout::Frame;
+use crate::gpu::Gpu;
+use crate::height::Field;
+use crate::lod::Technique;
+use crate::plan::{Look, ScenePlan};
+use crate::scene::holes::Truth;
+use crate::scene::{Copy, Scene, Stage};
+use crate::view::View;
+
+/// Of a flight so many frames are drawn.
+const FRAMES: usize = 8;
+
+/// Pictures are at most so many pixels wide and high: larger views are drawn smaller, with the same lens.
+const MOST_PX: u32 = 128;
+
+/// Looks through a device.
+pub struct DeviceEye {
+    gpu: Arc<Gpu>,
+    look: Look,
+}
+
+/// What was seen so far.
+struct Seen {
+    holes: usize,
+    holes_at: Option<Broken>,
+    drawn: Result<(), Broken>,
+    again: Result<(), Broken>,
+}
+
+impl DeviceEye {
+    /// Through this one.
+    pub fn new(gpu: Arc<Gpu>) -> Self {
+        Self { gpu, look: Look::default() }
+    }
+
+    /// Hands the device back; validation messages.
+    pub fn close(self) -> Vec<String> {
+        Gpu::close(self.gpu)
+    }
+
+    fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
+        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        Ok(plan.with_manner(technique.manner()))
+    }
+
+    fn stage(&self, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
+        let plan = self.plan(field, technique)?;
+        self.scene(field, &plan).stage(technique, size)
+    }
+
+    fn scene<'a>(&'a self, field: &'a Arc<Field>, plan: &'a ScenePlan) -> Scene<'a> {
+        Scene { gpu: &self.gpu, field, plan, look: &self.look, overlay: None }
+    }
+
+    /// Draws views in turn and looks at each.
+    fn look_at(&self, field: &Arc<Field>, form: &Form, views: &[(&'static str, View)]) -> Result<Vec<Finding>> {
+        let mut technique = form.entry.prepare(field, &form.settings).map_err(anyhow::Error::msg)?;
+        let mut seen = Seen { holes: 0, holes_at: None, drawn: Ok(()), again: Ok(()) };
+        let mut stage: Option<(Stage, [u32; 2])> = None;
+        for (name, view) in views {
+            let view = View { size: view.size.map(|side| side.min(MOST_PX)), ..*view };
+            if stage.as_ref().is_none_or(|(_, size)| *size != view.size) {
+                stage = Some((self.stage(field, technique.as_ref(), view.size)?, view.size));
+            }
+            let Some((stage, _)) = &mut stage else { continue };
+            self.frame(field, technique.as_mut(), stage, (name, view), &mut seen).context(*name)?;
+        }
+        Ok(seen.findings())
+    }
+
+    fn frame(
+        &self,
+        field: &Arc<Field>,
+        technique: &mut dyn Technique,
+        stage: &mut Stage,
+        named: (&'static str, View),
+        seen: &mut Seen,
+    ) -> Result<()> {
+        let view = &named.1;
+        let broken = |why: &str| Err(Broken { view: named, why: why.to_string() });
+        stage.draw(technique, view, Copy::PictureAndDepth)?;
+        stage.complete()?;
+        let picture = stage.picture();
+        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        let holes = Truth::new(&self.scene(field, &plan), view)?.hole_pixels(view, &picture).len();
+        if holes > 0 && seen.holes_at.is_none() {
+            seen.holes_at = Some(Broken { view: named, why: format!("{holes} pixels of sky where land is") });
+        }
+        seen.holes += holes;
+        if stage.captures() && !is_as_listed(field, technique, stage, view)? {
+            seen.drawn = seen.drawn.clone().and(broken("the device draws other triangles than the list says"));
+        }
+        if technique.is_settled() {
+            stage.draw(technique, view, Copy::PictureAndDepth)?;
+            stage.complete()?;
+            if technique.is_settled() && stage.picture() != picture {
+                seen.again = seen.again.clone().and(broken("the same frame has another picture"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether the triangles captured on the device are those of the list, to the bit.
+fn is_as_listed(field: &Field, technique: &dyn Technique, stage: &mut Stage, view: &View) -> Result<bool> {
+    let placing = Frame::placing(field, view);
+    let expanded = [
+        expand::triangles(field, &placing, technique.resident(), &stage.list),
+        expand::skirts(field, &placing, technique.resident(), &stage.list),
+    ];
+    let captured = stage.capture(technique, view)?;
+    Ok(captured.iter().zip(&expanded).all(|(there, here)| there.iter().map(|t| t.drawn).eq(here.iter().copied())))
+}
+
+impl Seen {
+    fn findings(self) -> Vec<Finding> {
+        let holes = Finding::within("pixels of sky through land", self.holes as f64, 0.0);
+        vec![
+            Finding { broken: self.holes_at, ..holes },
+            Finding::holds("the device draws the list", self.drawn),
+            Finding::holds("same frame twice, same picture", self.again),
+        ]
+    }
+}
+
+impl Eye for DeviceEye {
+    fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding> {
+        let (field, views) = match &case.kind {
+            Kind::Land(land) => {
+                let Land { field, views } = land();
+                (field, views)
+            }
+            Kind::Flight(flight) => {
+                let Flight { field, views } = flight();
+                (field, views.into_iter().take(FRAMES).map(|view| ("a frame", view)).collect())
+            }
+            Kind::Each(_) | Kind::Alone(..) => return Vec::new(),
+        };
+        let looked = self.look_at(&field, form, &views);
+        looked.unwrap_or_else(|e| vec![Finding::within("drawn", 1.0, 0.0).because(Some(format!("{e:#}")))])
+    }
+
+    fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage> {
+        let mut technique = form.entry.prepare(field, &form.settings).ok()?;
+        let view = View { size: view.size.map(|side| side.clamp(MOST_PX / 2, 4 * MOST_PX)), ..*view };
+        let mut stage = self.stage(field, technique.as_ref(), view.size).ok()?;
+        stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).ok()?;
+        stage.complete().ok()?;
+        Some(stage.picture())
+    }
+}

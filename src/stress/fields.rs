@@ -1,0 +1,85 @@
+//! Fields that are hard to draw.
+
+use std::sync::Arc;
+
+use super::{Case, Kind, Land, views};
+use crate::height::synth::{self, noise};
+use crate::height::{Field, Holes, Options, Samples, load_bytes};
+
+const fn case(name: &'static str, land: fn() -> Land) -> Case {
+    Case { family: "data", name, kind: Kind::Land(land) }
+}
+
+/// The family `data`.
+pub const CASES: &[Case] = &[
+    case("flat", || of_kind(synth::Kind::Flat, [65, 65])),
+    case("one spike of 1e5 m", || of_kind(synth::Kind::Spike, [97, 81])),
+    case("checkerboard of the full range of 16 bits", || of_kind(synth::Kind::Checker, [65, 65])),
+    case("vertical cliff", || of_kind(synth::Kind::Cliff, [97, 97])),
+    case("ridge of one sample", || of_kind(synth::Kind::Ridge, [81, 90])),
+    case("NaN, infinity and nodata islands", || seen(islands())),
+    case("2 x 2", || seen(made([2, 2], [1.0; 2], |i, j| (i * j) as f32))),
+    case("2 x 77", || seen(hills([2, 77], [1.0; 2], 20.0))),
+    case("1025 x 3", || seen(hills([1025, 3], [10.0; 2], 100.0))),
+    case("prime sides, 131 x 67", || seen(hills([131, 67], [30.0; 2], 900.0))),
+    case("samples 1 mm apart", || seen(hills([81, 66], [1e-3; 2], 0.02))),
+    case("samples 100 km apart", || seen(hills([81, 66], [1e5; 2], 9000.0))),
+    case("samples 0.25 m and 40 m apart", || seen(hills([70, 100], [0.25, 40.0], 60.0))),
+    case("heights of 1e-6 m", || seen(hills([81, 66], [1.0; 2], 1e-6))),
+    case("heights of 1e7 m", || seen(hills([81, 66], [1e6; 2], 1e7))),
+    case("nothing above the sea", || seen(lowered(hills([81, 66], [10.0; 2], 300.0), 4000.0))),
+];
+
+fn of_kind(kind: synth::Kind, size: [u32; 2]) -> Land {
+    seen(synth::synth(kind, size, 3))
+}
+
+/// With the views of the laws.
+pub fn seen(field: Field) -> Land {
+    let field = Arc::new(field);
+    Land { views: views::views(&field), field }
+}
+
+fn made([w, h]: [u32; 2], spacing: [f64; 2], height: impl Fn(u32, u32) -> f32) -> Field {
+    let heights = (0..w * h).map(|k| height(k % w, k / w)).collect();
+    Field::new(Samples::F32(heights), [w, h], spacing, Holes::none((w * h) as usize))
+}
+
+/// Hills of many sizes, 0 to about `height_m`.
+pub fn hills(size: [u32; 2], spacing: [f64; 2], height_m: f64) -> Field {
+    made(size, spacing, |i, j| {
+        let at = [f64::from(i) / 24.0, f64::from(j) / 24.0];
+        (height_m * (0.5 + 0.5 * noise::fractal(at, 6, 3))) as f32
+    })
+}
+
+/// Hills so far from the world's origin along both axes, metres.
+pub fn hills_at(origin_m: f64) -> Field {
+    let mut field = hills([97, 81], [10.0; 2], 300.0);
+    field.origin = [origin_m, -origin_m];
+    field
+}
+
+fn lowered(field: Field, by_m: f32) -> Field {
+    let heights = (0..field.samples().len()).map(|k| field.samples().height(k) - by_m).collect();
+    Field::new(Samples::F32(heights), field.size(), field.spacing, Holes::none(field.samples().len()))
+}
+
+/// Bare floats as a file has them: what is no number and what is no data becomes a hole.
+fn islands() -> Field {
+    let size = [99u32, 70];
+    let land = hills(size, [10.0; 2], 300.0);
+    let sample = |k: u32| {
+        let [i, j] = [k % size[0], k / size[0]].map(f64::from);
+        match k {
+            _ if (i - 30.0).hypot(j - 30.0) < 14.0 => f32::NAN,
+            _ if i > 80.0 + j / 9.0 => -9999.0,
+            _ if noise::white(k.into(), 5, 7) > 0.98 => f32::INFINITY,
+            _ => land.samples().height(k as usize),
+        }
+    };
+    let bytes: Vec<u8> = (0..size[0] * size[1]).flat_map(|k| sample(k).to_le_bytes()).collect();
+    let raw = Some("99x70:f32le".parse().expect("a layout"));
+    let options = Options { raw, nodata: Some(-9999.0), spacing: Some([10.0; 2]), ..Options::default() };
+    load_bytes("islands.raw", &bytes, &options).expect("bytes of its layout").field
+}

@@ -1,0 +1,194 @@
+//! The stability battery: every technique on stiff and extreme fields, positions, views and times; the budget
+//! controller on loads that are hard to hold; the loaders on broken files. A case passes when the picture and the
+//! numbers are right, not when nothing crashed.
+//!
+//! A case is a row of [`CASES`]; what is found in it, a [`Row`] for each technique and check. A technique that is new
+//! in the table is in the battery.
+
+mod arithmetic;
+mod fields;
+mod file;
+mod flight;
+pub mod forms;
+pub mod jitter;
+mod land;
+pub mod laws;
+pub mod plants;
+mod position;
+pub mod rows;
+pub mod saved;
+pub mod stiff;
+mod time;
+pub mod views;
+
+#[cfg(feature = "vulkan")]
+pub mod device;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::height::Field;
+use crate::view::View;
+
+pub use self::flight::Flight;
+pub use self::forms::Form;
+pub use self::land::Land;
+use self::laws::Broken;
+pub use self::rows::{Picture, Row, SCHEMA, Stress};
+
+/// What a check found.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The check, with its unit where it has one.
+    pub check: &'static str,
+    /// What was found.
+    pub value: f64,
+    /// The most that passes; `None`: it is only told.
+    pub limit: Option<f64>,
+    /// Where it failed, and how.
+    pub broken: Option<Broken>,
+    /// How it failed, where no view is to blame.
+    pub why: Option<String>,
+}
+
+impl Finding {
+    /// A value that is at most a limit.
+    pub fn within(check: &'static str, value: f64, limit: f64) -> Self {
+        Self { check, value, limit: Some(limit), broken: None, why: None }
+    }
+
+    /// A value that is only told: what others are compared with.
+    pub fn told(check: &'static str, value: f64) -> Self {
+        Self { check, value, limit: None, broken: None, why: None }
+    }
+
+    /// 0 where something holds, else 1.
+    pub fn holds(check: &'static str, outcome: Result<(), Broken>) -> Self {
+        let broken = outcome.err();
+        Self { broken: broken.clone(), ..Self::within(check, f64::from(u8::from(broken.is_some())), 0.0) }
+    }
+
+    /// The same, with how it failed.
+    pub fn because(self, why: Option<String>) -> Self {
+        Self { why, ..self }
+    }
+
+    /// Whether the value is within its limit; no number never is.
+    pub fn passes(&self) -> bool {
+        self.limit.is_none_or(|limit| self.value <= limit)
+    }
+}
+
+/// What is done in a case.
+pub enum Kind {
+    /// Every technique draws a field from views, and every law is held against what it draws.
+    Land(fn() -> Land),
+    /// Every technique, in every word of its settings, is flown; each frame is one surface within its tolerance.
+    Flight(fn() -> Flight),
+    /// Something of its own is done with every technique.
+    Each(fn(&Form) -> Vec<Finding>),
+    /// No technique takes part: whose it is, and what is done.
+    Alone(&'static str, fn() -> Vec<Finding>),
+}
+
+/// A row of the battery.
+pub struct Case {
+    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff` or `file`.
+    pub family: &'static str,
+    /// Its name.
+    pub name: &'static str,
+    /// What is done.
+    pub kind: Kind,
+}
+
+/// The battery, family by family.
+pub const FAMILIES: &[&[Case]] =
+    &[fields::CASES, position::CASES, views::CASES, time::CASES, arithmetic::CASES, stiff::CASES, file::CASES];
+
+/// All cases.
+pub fn cases() -> impl Iterator<Item = &'static Case> {
+    FAMILIES.iter().copied().flatten()
+}
+
+/// Looks at what a device draws.
+pub trait Eye {
+    /// What it finds in the pictures of a case.
+    fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding>;
+
+    /// A picture of a field, if it can be drawn.
+    fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage>;
+}
+
+/// A case with one technique or, if it needs none, without.
+pub struct Trial {
+    /// The case.
+    pub case: &'static Case,
+    /// The technique.
+    pub form: Option<Form>,
+}
+
+impl Trial {
+    /// Whose row it is.
+    pub fn technique(&self) -> String {
+        match (&self.form, &self.case.kind) {
+            (Some(form), _) => form.name.clone(),
+            (None, Kind::Alone(whose, _)) => whose.to_string(),
+            (None, _) => unreachable!("only what stands alone has no technique"),
+        }
+    }
+
+    /// What is found without a device. A panic is a finding.
+    pub fn run(&self) -> Vec<Finding> {
+        let findings = catch_unwind(AssertUnwindSafe(|| match (&self.case.kind, &self.form) {
+            (Kind::Land(land), Some(form)) => land::examine(&land(), form),
+            (Kind::Flight(flight), Some(form)) => flight::examine(&flight(), form),
+            (Kind::Each(examine), Some(form)) => examine(form),
+            (Kind::Alone(_, examine), _) => examine(),
+            (_, None) => Vec::new(),
+        }));
+        findings.unwrap_or_else(|panic| {
+            let said = panic.downcast_ref::<String>().cloned();
+            let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
+            vec![Finding::within("panics", 1.0, 0.0).because(said)]
+        })
+    }
+}
+
+/// The trials of some cases with some techniques: in flights and on their own, the forms of every word.
+pub fn trials(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<Trial>, String> {
+    let mut trials = Vec::new();
+    for &case in cases {
+        let forms = match case.kind {
+            Kind::Land(_) | Kind::Each(_) => forms::plain(techniques)?,
+            Kind::Flight(_) => forms::every_word(techniques)?,
+            Kind::Alone(..) => Vec::new(),
+        };
+        if let Kind::Alone(..) = case.kind {
+            trials.push(Trial { case, form: None });
+        }
+        trials.extend(forms.into_iter().map(|form| Trial { case, form: Some(form) }));
+    }
+    Ok(trials)
+}
+
+/// Runs trials on all cores, and then those with pictures on a device, if there is one; in the order of the trials.
+pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, progress: impl Fn(&Trial) + Sync) -> Vec<Vec<Finding>> {
+    let mut found: Vec<_> = trials
+        .par_iter()
+        .map(|trial| {
+            progress(trial);
+            trial.run()
+        })
+        .collect();
+    if let Some(eye) = eye {
+        for (trial, findings) in trials.iter().zip(&mut found) {
+            if let Some(form) = &trial.form {
+                progress(trial);
+                findings.extend(eye.look(trial.case, form));
+            }
+        }
+    }
+    found
+}

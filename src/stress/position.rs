@@ -1,0 +1,63 @@
+//! Land far from the world's origin, and as much of it as there can be.
+
+use std::sync::Arc;
+
+use super::fields::{hills, hills_at, seen};
+use super::forms::Form;
+use super::land::all_numbers;
+use super::laws::Broken;
+use super::{Case, Finding, Kind, Land, jitter};
+use crate::bench::paths;
+use crate::draw::DrawList;
+use crate::view::{Metric, Tolerance};
+
+const fn case(name: &'static str, kind: Kind) -> Case {
+    Case { family: "position", name, kind }
+}
+
+/// The family `position`.
+pub const CASES: &[Case] = &[
+    case("origin at 1e5 m", Kind::Land(|| at(1e5))),
+    case("origin at 1e7 m", Kind::Land(|| at(1e7))),
+    case("origin at the Earth's radius and a millimetre", Kind::Land(|| at(jitter::EARTH_M))),
+    case("500 000 x 500 000 samples", Kind::Each(half_a_million)),
+    case("jitter at 0 m", Kind::Alone("vertex-program", || jitter::findings(0.0))),
+    case("jitter at 1e5 m", Kind::Alone("vertex-program", || jitter::findings(1e5))),
+    case("jitter at 1e7 m", Kind::Alone("vertex-program", || jitter::findings(1e7))),
+    case("jitter at the Earth's radius", Kind::Alone("vertex-program", || jitter::findings(jitter::EARTH_M))),
+];
+
+fn at(origin_m: f64) -> Land {
+    seen(hills_at(origin_m))
+}
+
+/// Frames of a path over it.
+const FRAMES: usize = 4;
+
+/// A small field tiled to half a million samples a side, seen from near the ground as far as the horizon: lists fit the
+/// limits, and every number is one. Laws that look at all samples would take days.
+fn half_a_million(form: &Form) -> Vec<Finding> {
+    let field = Arc::new(hills([512, 512], [5.0; 2], 300.0).tiled([977, 977]));
+    let mut technique = match form.entry.prepare(&field, &form.settings) {
+        Ok(technique) => technique,
+        Err(why) => return vec![Finding::told("refused, saying why", 1.0).because(Some(why))],
+    };
+    let tolerance = Tolerance { px: 16.0, metric: Metric::Certified };
+    let views = paths::find("corner").expect("a named path").views(&field, FRAMES, [160, 90], tolerance);
+    let (mut fits, mut numbers) = (Ok(()), Ok(()));
+    for view in &views {
+        let mut list = DrawList::default();
+        technique.select(view, &mut list);
+        let named = ("corner", *view);
+        let (size, limits) = (list.size(), technique.limits());
+        if !limits.hold(&size) {
+            fits = fits.and(Err(Broken { view: named, why: format!("{size:?} exceeds {limits:?}") }));
+        }
+        let fine = all_numbers(&field, technique.as_ref(), view, &list);
+        numbers = numbers.and(fine.map_err(|why| Broken { view: named, why }));
+    }
+    vec![
+        Finding::holds("lists fit the limits", fits),
+        Finding::holds("no NaN, no subnormal, weights in [0, 1]", numbers),
+    ]
+}

@@ -1,0 +1,142 @@
+//! Views of a field: those that the laws are tried on, and extreme ones.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::fields::hills;
+use super::forms::Form;
+use super::laws::{LAWS, Subject};
+use super::{Case, Finding, Kind, Land};
+use crate::height::Field;
+use crate::lod::Technique;
+use crate::view::{Aabb, Containment, Lens, Metric, Tolerance, View};
+
+const fn case(name: &'static str, land: fn() -> Land) -> Case {
+    Case { family: "view", name, kind: Kind::Land(land) }
+}
+
+/// The family `view`. Straight down, upside down, rolled, parallel, under the land and exactly on a vertex are views of
+/// every land ([`views`]).
+pub const CASES: &[Case] = &[
+    case("every common view", || extreme(|view| view)),
+    case("half a degree wide", || extreme(|view| wide(view, 0.5))),
+    case("170 degrees wide", || extreme(|view| wide(view, 170.0))),
+    case("near plane at 1 mm", || extreme(|view| View { near: 1e-3, ..view })),
+    case("1 x 1 pixels", || extreme(|view| View { size: [1, 1], ..view })),
+    case("16384 x 1 pixels", || extreme(|view| View { size: [16384, 1], ..view })),
+    Case { family: "view", name: "exactly on a threshold", kind: Kind::Each(on_a_threshold) },
+];
+
+/// The land of this family.
+fn land() -> Field {
+    hills([129, 97], [10.0; 2], 400.0)
+}
+
+/// Its common views, changed.
+fn extreme(change: fn(View) -> View) -> Land {
+    let field = Arc::new(land());
+    Land { views: views(&field).into_iter().map(|(name, view)| (name, change(view))).collect(), field }
+}
+
+/// As wide; parallel rays stay.
+fn wide(view: View, degrees: f64) -> View {
+    match view.lens {
+        Lens::Perspective { .. } => View { lens: Lens::Perspective { fov_x: degrees.to_radians() }, ..view },
+        Lens::Orthographic { .. } => view,
+    }
+}
+
+/// The last eye from which one list is drawn and the first from which another is, next to each other as numbers are, on
+/// the way from above a corner to far away: every law on both sides.
+fn on_a_threshold(form: &Form) -> Vec<Finding> {
+    let field = Arc::new(land());
+    let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
+    let all = views(&field);
+    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
+    let (near, far) = (of("from above a corner"), of("far outside"));
+    let Some(sides) = threshold(&field, &mut *technique, near, far.eye) else {
+        return vec![Finding::told("every list is the same", 1.0)];
+    };
+    let views = [("just before", sides[0]), ("just behind", sides[1])];
+    let mut subject = Subject { field: &field, technique: &mut *technique, views: &views, time_s: 0.0 };
+    let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
+    laws.map(|law| Finding::holds(law.name, (law.check)(&mut subject))).collect()
+}
+
+/// The view and its eye moved towards `end`, halved until nothing lies between two that draw differently many triangles;
+/// `None` if both ends draw as many.
+pub fn threshold(field: &Field, technique: &mut dyn Technique, view: View, end: DVec3) -> Option<[View; 2]> {
+    let mut subject = Subject { field, technique, views: &[], time_s: 0.0 };
+    let way = end - view.eye;
+    let at = |share: f64| View { eye: view.eye + way * share, ..view };
+    let mut triangles = |share: f64| subject.select(&at(share)).map(|list| list.triangles()).ok();
+    let (mut low, mut high) = (0.0, 1.0);
+    let first = triangles(low)?;
+    if triangles(high)? == first {
+        return None;
+    }
+    while at(low).eye != at(high).eye {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        *(if triangles(middle)? == first { &mut low } else { &mut high }) = middle;
+    }
+    Some([at(low), at(high)])
+}
+
+/// The view with another tolerance, certified.
+pub fn with_tolerance(view: &View, px: f64) -> View {
+    View { tolerance: Tolerance { px, metric: Metric::Certified }, ..*view }
+}
+
+/// Views of a field, near and far from it and far from each other: from one to the next is a teleport.
+pub fn views(field: &Field) -> Vec<(&'static str, View)> {
+    let [w, h] = field.size().map(f64::from);
+    let (low, high) = (field.world_at(0.0, 0.0, 0.0), field.world_at(w - 1.0, h - 1.0, 0.0));
+    let (size, range) = (high - low, field.statistics());
+    let at = |u: f64, v: f64, above: f64| {
+        let ground = field.height(((w - 1.0) * u.min(1.0)) as u32, ((h - 1.0) * v.min(1.0)) as u32);
+        low + size * DVec3::new(u, 0.0, v) + DVec3::Y * (f64::from(ground) + above)
+    };
+    let (middle, extent) = (at(0.5, 0.5, 0.0), size.length());
+    let pinhole = |eye, rotation, degrees: f64| perspective(eye, rotation, degrees, extent);
+    let towards = |eye: DVec3| View::looking_along(middle - eye);
+    let (corner, far) = (at(-0.1, 1.1, 0.0) + DVec3::Y * extent / 3.0, middle + DVec3::new(7.0, 4.0, -9.0) * extent);
+    let above = middle + DVec3::Y * extent;
+    let under = DVec3::new(middle.x, f64::from(range.min) - extent / 5.0, middle.z);
+    let over = DVec3::new(middle.x, f64::from(range.max) + extent, middle.z);
+    vec![
+        ("inside", pinhole(at(0.45, 0.55, extent / 40.0), View::turned(30.0, -10.0, 0.0), 90.0)),
+        ("on a vertex", pinhole(at(0.5, 0.5, 0.0), View::turned(200.0, 0.0, 0.0), 60.0)),
+        ("from above a corner", pinhole(corner, towards(corner), 60.0)),
+        ("far outside", pinhole(far, towards(far), 30.0)),
+        ("straight down", pinhole(above, View::turned(90.0, -90.0, 0.0), 75.0)),
+        ("from under the land", pinhole(under, View::turned(0.0, 60.0, 20.0), 100.0)),
+        ("5°", pinhole(corner, towards(corner), 5.0)),
+        ("120°, upside down", pinhole(at(0.2, 0.3, extent / 15.0), View::turned(45.0, -30.0, 180.0), 120.0)),
+        ("orthographic", orthographic(corner, towards(corner), extent / 2.0)),
+        ("orthographic, all", orthographic(over, View::turned(-90.0, -90.0, 0.0), 3.0 * extent)),
+        ("away from it", pinhole(far, View::looking_along(far - middle), 60.0)),
+    ]
+}
+
+fn perspective(eye: DVec3, world_from_eye: DMat3, degrees: f64, extent: f64) -> View {
+    let lens = Lens::Perspective { fov_x: degrees.to_radians() };
+    let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
+    View { eye, world_from_eye, lens, size: [320, 180], near: extent / 1e4, tolerance, time_s: 0.0 }
+}
+
+fn orthographic(eye: DVec3, world_from_eye: DMat3, width: f64) -> View {
+    let view = perspective(eye, world_from_eye, 90.0, width);
+    View { lens: Lens::Orthographic { width, far: 1e9 }, ..view }
+}
+
+/// Whether all samples are in the frustum for certain.
+pub fn sees_everything(field: &Field, view: &View) -> bool {
+    let [w, h] = field.size().map(|n| f64::from(n - 1));
+    let range = field.statistics();
+    let bounds = Aabb { min: field.world_at(0.0, 0.0, range.min.into()), max: field.world_at(w, h, range.max.into()) };
+    view.frustum().contains(&bounds) == Containment::Inside
+}

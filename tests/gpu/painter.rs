@@ -1,0 +1,125 @@
+//! The painter's algorithm on the device: sorted strips drawn back to front without a depth buffer show what they show
+//! with one.
+
+use std::sync::Arc;
+
+use cuesta::bench::paths;
+use cuesta::draw::{DrawList, Geometry, Hiding, Limits, Manner};
+use cuesta::gpu::Gpu;
+use cuesta::height::{Field, synth};
+use cuesta::lod::Technique;
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::view::{Metric, Tolerance, View};
+
+use super::{aslant, mountains, on_device, shoot, technique};
+
+const SIZE: [u32; 2] = [96, 64];
+
+fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
+    let look = Look::default();
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
+    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
+}
+
+/// A technique's lists as they are, drawn without a depth buffer.
+struct Painted(Box<dyn Technique>);
+
+impl Technique for Painted {
+    fn resident(&self) -> &Geometry {
+        self.0.resident()
+    }
+    fn limits(&self) -> Limits {
+        self.0.limits()
+    }
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.0.select(view, list);
+    }
+    fn keeps_tolerance(&self) -> bool {
+        self.0.keeps_tolerance()
+    }
+    fn manner(&self) -> Manner {
+        Manner { hiding: Hiding::ByOrder, ..self.0.manner() }
+    }
+}
+
+/// Bytes of depth buffers that are there.
+fn depth_bytes(gpu: &Gpu) -> u64 {
+    gpu.device_bytes().get("depth").copied().unwrap_or(0)
+}
+
+/// Pixels that differ in any channel.
+fn differing(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {
+    a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count()
+}
+
+#[test]
+fn without_a_depth_buffer_no_pixel_differs_on_any_named_path() {
+    on_device(|gpu| {
+        let mut field = synth::synth(synth::Kind::Fractal, [201, 170], 3);
+        field.spacing = [20.0, 20.0];
+        let field = Arc::new(field);
+        let tolerance = Tolerance { px: 0.7, metric: Metric::Certified };
+        let sorted = |settings: &[&str]| technique(&field, "sorted-strips", settings);
+        let mut unsorted = 0;
+        for level in ["level=certified", "level=uniform"] {
+            let mut drawn: [Box<dyn Technique>; 3] = [
+                sorted(&[level, "order=front"]),
+                sorted(&[level, "order=painter"]),
+                Box::new(Painted(sorted(&[level, "order=front"]))),
+            ];
+            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref()));
+            for path in paths::PATHS {
+                let (mut wrong, mut land) = (0, 0);
+                for view in path.views(&field, 200, SIZE, tolerance).iter().step_by(19) {
+                    let mut picture = |k: usize| {
+                        stages[k].draw(drawn[k].as_mut(), view, Copy::Picture).unwrap();
+                        stages[k].picture()
+                    };
+                    let [with_depth, painted, nearest_first] = [0, 1, 2].map(&mut picture);
+                    land += with_depth.pixels().filter(|p| p.0[3] > 0).count();
+                    wrong += differing(&with_depth, &painted);
+                    unsorted += differing(&with_depth, &nearest_first);
+                }
+                println!("{level} {}: {wrong} of {land} pixels differ", path.name);
+                assert!(land > 0 && wrong == 0, "{level} {}: {wrong} pixels differ", path.name);
+            }
+        }
+        assert!(unsorted > 1000, "the order matters: {unsorted} pixels differ nearest first");
+    });
+}
+
+/// Who asks for the depths gets those of a depth buffer, and nobody else pays for one.
+#[test]
+fn depths_are_there_for_who_asks() {
+    on_device(|gpu| {
+        let field = mountains();
+        let view = aslant(&field, SIZE, 1.0);
+        let [deep, painted] = ["order=back", "order=painter"].map(|order| {
+            let mut technique = technique(&field, "sorted-strips", &[order]);
+            let mut stage = stage(gpu, &field, technique.as_ref());
+            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            assert_eq!(depth_bytes(gpu) > 0, order == "order=back");
+            stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
+            let (picture, depth) = (stage.picture(), stage.depth());
+            stage.draw_floor(&view, Copy::Picture).unwrap();
+            (picture, depth, stage.picture())
+        });
+        assert!(deep.1.iter().any(|&depth| depth > 0.0) && deep == painted);
+    });
+}
+
+/// The plan leaves the depth buffer out, and a frame whose draws are measured one by one has none either.
+#[test]
+fn a_probed_frame_is_painted_too() {
+    on_device(|gpu| {
+        let field = mountains();
+        let view = aslant(&field, SIZE, 1.0);
+        let mut sorted = technique(&field, "sorted-strips", &["order=painter"]);
+        let shown = shoot(gpu, &field, sorted.as_mut(), &view).picture;
+        let mut stage = stage(gpu, &field, sorted.as_ref());
+        stage.draw_probed(sorted.as_mut(), "sorted-strips", &view).unwrap();
+        assert_eq!(differing(&stage.picture(), &shown), 0);
+        assert_eq!(depth_bytes(gpu), 0);
+    });
+}

@@ -1,0 +1,59 @@
+//! Sorted strips beside the picture: what a turn of the head brings into sight is as fine as it will be.
+
+use std::sync::Arc;
+
+use cuesta::draw::DrawList;
+use cuesta::height::synth;
+use cuesta::measure::pop;
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
+
+use super::technique;
+
+const TOLERANCE: Tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
+
+/// The largest jump, pixels, and the triangles, while the head turns by `degrees` at a time.
+fn turned(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
+    let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 5);
+    field.spacing = [20.0, 20.0];
+    let field = Arc::new(field);
+    let mut strips = technique(&field, "sorted-strips", &[guard]);
+    let eye = field.world_at(128.3, 127.6, f64::from(field.statistics().max)) + DVec3::Y * 60.0;
+    let view = |k: u32| {
+        let world_from_eye = View::turned(f64::from(k) * degrees, -15.0, 0.0);
+        View { eye, world_from_eye, lens, size: [640, 360], near: 1.0, tolerance: TOLERANCE, time_s: 0.0 }
+    };
+    let (mut largest_px, mut triangles) = (0f64, 0);
+    let mut before: Option<(View, DrawList)> = None;
+    for k in 0..12 {
+        let (view, mut list) = (view(k), DrawList::default());
+        strips.select(&view, &mut list);
+        triangles += list.triangles();
+        if let Some((from, old)) = &before {
+            let state = |view, list| pop::State { view, resident: strips.resident(), list };
+            let found = pop::pop(&field, state(from, old), state(&view, &list));
+            assert!(found.samples > 1000, "land is seen twice");
+            largest_px = largest_px.max(found.max_px);
+        }
+        before = Some((view, list));
+    }
+    (largest_px, triangles)
+}
+
+#[test]
+fn a_turn_of_the_head_brings_nothing_coarse_into_sight() {
+    let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
+    let (open_px, least) = turned("guard=0", lens, 8.0);
+    let (kept_px, most) = turned("guard=0.25", lens, 8.0);
+    println!("jumps of {open_px} px without a band and {kept_px} px with it, {least} and {most} triangles");
+    // Both lists are within the tolerance, each in its own view.
+    assert!(kept_px <= 3.0 * TOLERANCE.px && open_px > 5.0 * TOLERANCE.px, "{kept_px} {open_px}");
+    assert!(most < 2 * least, "the band is no second picture: {most} of {least}");
+}
+
+#[test]
+fn a_turn_beyond_the_band_is_not_guarded() {
+    let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
+    let (px, _) = turned("guard=0.02", lens, 25.0);
+    assert!(px > 5.0 * TOLERANCE.px, "{px}");
+}
