@@ -1,11 +1,14 @@
 //! `cuesta info`: what was read; the scene plan; the devices.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+
 use anyhow::{Result, bail};
 use clap::Args;
 use serde::Serialize;
 
-use super::scene::{LookArgs, ReadArgs, TechniqueArgs};
-use super::{Common, Outcome, report};
+use super::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
+use super::{Common, Outcome, report, working_set};
 use crate::height::Loaded;
 use crate::plan::{Decision, DeviceLimits, ScenePlan};
 
@@ -21,6 +24,12 @@ pub struct InfoArgs {
     /// What this scene needs on the device, and what it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
+    /// Draws which nodes of a map of 2^36 texels over the field the view needs, and how fine: a .png.
+    #[arg(long, value_name = "FILE", requires = "terrain", conflicts_with = "plan")]
+    pub working_set: Option<PathBuf>,
+    /// The view that is needed for.
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Vulkan devices, and what is missing on each.
     #[arg(long)]
     pub devices: bool,
@@ -102,6 +111,13 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         bail!("info: expected a terrain or --devices");
     };
     let loaded = args.reading.load(common, terrain)?;
+    if let Some(path) = &args.working_set {
+        let field = Arc::new(loaded.field);
+        let view = args.view.build(&field, args.technique.tolerance()?)?;
+        let mut technique = args.technique.build(common, &field)?;
+        report::print(common, &working_set::draw(&field, technique.as_mut(), &view, path)?)?;
+        return Ok(Outcome::Done);
+    }
     if !args.plan {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);
@@ -109,7 +125,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     let (look, _) = args.look.build(terrain)?;
     let plan = ScenePlan::new(&loaded.field, &look, &device_limits(common)?).map_err(anyhow::Error::msg)?;
     let (entry, _) = args.technique.settings()?;
-    let field = std::sync::Arc::new(loaded.field);
+    let field = Arc::new(loaded.field);
     let technique = args.technique.build(common, &field)?;
     let (kept, left_out) = plan.with_manner(technique.manner()).decisions(&field);
     let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();

@@ -16,6 +16,7 @@ pub mod stress;
 pub mod synth;
 #[cfg(feature = "viewer")]
 pub mod view;
+pub mod working_set;
 
 use std::process::ExitCode;
 

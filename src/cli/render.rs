@@ -1,6 +1,6 @@
 //! `cuesta render`: one picture, and with `--measure` the error of what was really drawn.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,7 +15,6 @@ use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::{Choice, Gpu, Instance};
 use crate::height::Error;
-use crate::height::save::replace;
 use crate::lod::Technique;
 use crate::measure::geometric::{self, Summary};
 use crate::measure::watertight;
@@ -143,7 +142,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let plan = plan.with_manner(technique.manner());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
-    save(&args.output, &shot.picture)?;
+    report::save(&args.output, &shot.picture)?;
     let measured = if args.measure { Some(measure(&scene, technique.as_ref(), &view, &shot)?) } else { None };
     let device = gpu.candidate.name.clone();
     let messages = Gpu::close(gpu);
@@ -180,13 +179,6 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
 
 fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
-}
-
-/// Writes a picture's colours, or leaves the file that was there.
-pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
-    let rgb = image::DynamicImage::from(picture.clone()).into_rgb8();
-    let written = replace(path, |out| rgb.write_to(out, image::ImageFormat::Png).map_err(std::io::Error::other));
-    Ok(written.map_err(|e| Error::new(path.display().to_string(), "file", e))?)
 }
 
 fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -> Result<Measured> {

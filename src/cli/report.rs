@@ -1,6 +1,7 @@
 //! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr.
 
 use std::fmt;
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -9,7 +10,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::Common;
+use crate::height::Error;
 use crate::height::progress::Progress;
+use crate::height::save::replace;
 
 /// Prints a result: as one JSON document, or one line a field.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
@@ -74,4 +77,11 @@ pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
     bar.set_message(what.into());
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
+}
+
+/// Writes a picture's colours, or leaves the file that was there.
+pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
+    let rgb = image::DynamicImage::from(picture.clone()).into_rgb8();
+    let written = replace(path, |out| rgb.write_to(out, image::ImageFormat::Png).map_err(std::io::Error::other));
+    Ok(written.map_err(|e| Error::new(path.display().to_string(), "file", e))?)
 }

@@ -99,7 +99,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         target,
         vsync: args.vsync == Switch::On && args.frame_time.is_none(),
         seconds: args.seconds,
-        save: render::save,
+        save: report::save,
     })?;
     for message in &summary.messages {
         eprintln!("validation: {}", message.replace('\n', " "));

@@ -55,9 +55,7 @@ impl Pipelines {
         let (sky, has_depth) = (vk::Pipeline::null(), formats.depth.is_some());
         let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, has_depth, terrain: BTreeMap::new() };
         pipelines.sky = pipelines.make_sky(formats)?;
-        // Streamed geometry has no normals.
-        let streamed = (plan.manner.normals == Normals::Vertices).then_some(Source::Streamed);
-        for source in [Source::Lattice, Source::Resident].into_iter().chain(streamed) {
+        for source in [Source::Lattice, Source::Resident] {
             for topology in [Topology::Triangles, Topology::Strip] {
                 let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
                 pipelines.terrain.insert((source, topology), pipeline);
@@ -66,7 +64,7 @@ impl Pipelines {
         Ok(pipelines)
     }
 
-    /// The pipeline that draws such draws. Resident and streamed geometry share one, if both are lit alike.
+    /// The pipeline that draws such draws. Resident and streamed geometry share one.
     pub fn terrain(&self, source: Source, topology: Topology) -> vk::Pipeline {
         let own = self.terrain.get(&(source, topology));
         *own.unwrap_or_else(|| &self.terrain[&(Source::Resident, topology)])
@@ -117,7 +115,7 @@ pub(super) fn terrain(
             .stride(size_of::<Instance>() as u32)
             .input_rate(vk::VertexInputRate::INSTANCE),
     ];
-    let has_normals = plan.manner.normals == Normals::Vertices && source == Source::Resident;
+    let has_normals = plan.manner.normals == Normals::Vertices && source != Source::Lattice;
     if has_normals && matches!(pass, Pass::Picture(_)) {
         bindings
             .push(vk::VertexInputBindingDescription::default().binding(2).stride(size_of::<VertexNormals>() as u32));

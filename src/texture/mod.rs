@@ -9,4 +9,6 @@ pub mod page_maps;
 pub mod pieces;
 pub mod resident_maps;
 pub mod resolution;
+pub mod slots;
+pub mod wedges;
 pub mod working_set;

@@ -106,7 +106,8 @@ impl<'a> Cutter<'a> {
         let seen = self.on_screen(corners, &outline);
         // Rows count downwards on the screen, southwards on the map: seen from above both turn the same way.
         let area_px = -area(seen.corners.iter().copied());
-        let share = area(outline.iter().map(|corner| corner.map)).abs() * 2f64.powi(level as i32 + 1);
+        let on_map = |corners: &[Corner]| area(corners.iter().map(|corner| corner.map).collect::<Vec<_>>().into_iter());
+        let share = on_map(&outline) / on_map(corners);
         let texels = (self.density * area_px / share) as f32;
         let is_hidden = |depths: &Depths| !depths.sees(&seen);
         let is_seen = texels >= f32::MIN_POSITIVE && texels.is_finite() && !self.depths.is_some_and(is_hidden);

@@ -83,6 +83,16 @@ pub struct WorkingSet {
     frame: u32,
 }
 
+impl Node {
+    /// The node so many levels up around it.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    pub fn above(self, levels: u32) -> Self {
+        Self { level: self.level - levels, at: self.at.map(|n| n >> levels) }
+    }
+}
+
 impl Wedge {
     /// A number that no other wedge has, down to level 50.
     pub fn key(&self) -> u64 {

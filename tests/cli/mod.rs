@@ -1,5 +1,6 @@
 //! The program, run as a person runs it.
 
+mod endless;
 #[cfg(feature = "vulkan")]
 mod with_a_device;
 

@@ -5,6 +5,7 @@ mod bench;
 mod capture;
 mod detail;
 mod driven;
+mod endless;
 mod golden;
 mod layout;
 mod neck;

@@ -30,6 +30,14 @@ pub enum Way {
     Strips,
     /// Resident, lit by normals of its own that start as nonsense and are overwritten before it is drawn.
     Lit,
+    /// Streamed with normals of its own.
+    StreamedLit,
+}
+
+impl Way {
+    fn is_lit(self) -> bool {
+        matches!(self, Way::Lit | Way::StreamedLit)
+    }
 }
 
 impl Explicit {
@@ -66,14 +74,14 @@ impl Explicit {
                 ..Geometry::default()
             },
             Way::Lit => Geometry { normals: vec![VertexNormals::default(); mesh.vertices.len()], ..mesh.clone() },
-            Way::Streamed | Way::Strips => Geometry::default(),
+            Way::Streamed | Way::Strips | Way::StreamedLit => Geometry::default(),
         };
         let of_vertex = |vertex: &ExplicitVertex| {
             let [x, z] = vertex.position.map(|n| n as u32);
             let normal = normals::pack(field.normal(x, z));
             VertexNormals { normal, target: normal, further: 0 }
         };
-        let normals = if way == Way::Lit { mesh.vertices.iter().map(of_vertex).collect() } else { Vec::new() };
+        let normals = if way.is_lit() { mesh.vertices.iter().map(of_vertex).collect() } else { Vec::new() };
         Self { mesh, resident, normals, way }
     }
 }
@@ -90,7 +98,7 @@ impl Technique for Explicit {
             draws: 1000,
             instances: 1,
             vertices: self.mesh.vertices.len(),
-            normals: 0,
+            normals: self.normals.len(),
             indices: self.mesh.indices.len(),
             upload_bytes: bytes,
         }
@@ -100,7 +108,7 @@ impl Technique for Explicit {
         list.instances.push(Instance::default());
         let (source, topology) = match self.way {
             Way::Resident | Way::Uploaded | Way::Lit => (Source::Resident, Topology::Triangles),
-            Way::Streamed => (Source::Streamed, Topology::Triangles),
+            Way::Streamed | Way::StreamedLit => (Source::Streamed, Topology::Triangles),
             Way::Strips => (Source::Streamed, Topology::Strip),
         };
         let row = 2 * (self.mesh.vertices.last().unwrap().position[0] as usize + 1);
@@ -111,6 +119,7 @@ impl Technique for Explicit {
         }
         if source == Source::Streamed {
             list.streamed = self.mesh.clone();
+            list.streamed.normals = self.normals.clone();
         }
         if self.way == Way::Lit {
             list.uploads.push(Upload::Normals(0, self.normals.clone()));
@@ -127,7 +136,7 @@ impl Technique for Explicit {
     }
 
     fn manner(&self) -> Manner {
-        let normals = if self.way == Way::Lit { Normals::Vertices } else { Normals::Texture };
+        let normals = if self.way.is_lit() { Normals::Vertices } else { Normals::Texture };
         Manner { normals, ..Manner::default() }
     }
 }
@@ -159,9 +168,11 @@ fn normals_of_vertices_light_the_land_as_the_texture_does() {
         let field = whole_metres();
         let view = aslant(&field, [160, 120], 1.0);
         let truth = shoot(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
-        let lit = shoot(gpu, &field, &mut Explicit::new(&field, Way::Lit), &view);
-        let (largest, share) = super::difference(&lit.picture, &truth.picture, 20);
-        assert!(largest > 0 && share < 0.02, "{largest}, {share}");
+        for way in [Way::Lit, Way::StreamedLit] {
+            let lit = shoot(gpu, &field, &mut Explicit::new(&field, way), &view);
+            let (largest, share) = super::difference(&lit.picture, &truth.picture, 20);
+            assert!(largest > 0 && share < 0.02, "{way:?}: {largest}, {share}");
+        }
     });
 }
 

@@ -12,7 +12,7 @@ use cuesta::lod::Technique;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 
-const TOLERANCE_PX: f64 = 2.0;
+const TOLERANCE_PX: f64 = 8.0;
 
 fn land() -> Arc<Field> {
     Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))))
@@ -80,7 +80,7 @@ fn the_tolerance_is_kept_against_the_land_itself_from_space_to_a_stone() {
             }
             println!("{morph}, {above_m:9.3} m: {} triangles, {worst:.3} px at {seen} places", triangles.len());
             assert!(worst <= TOLERANCE_PX, "{above_m} m: {worst} px");
-            assert!(worst > 0.02 * TOLERANCE_PX && seen > 500, "{above_m} m: {worst} px at {seen} places");
+            assert!(worst > 0.05 * TOLERANCE_PX && seen > 500, "{above_m} m: {worst} px at {seen} places");
         }
     }
 }

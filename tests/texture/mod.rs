@@ -13,6 +13,7 @@ use cuesta::texture::hidden::Depths;
 use cuesta::texture::mip_spheres::Spheres;
 use cuesta::texture::pieces::{Bounds, Corner, Cutter};
 use cuesta::texture::resolution::{level_by_exponent, texture_area};
+use cuesta::texture::wedges;
 use cuesta::texture::working_set::{Stop, Wedge, WorkingSet};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
@@ -75,6 +76,16 @@ impl Flight {
             tolerance: Tolerance { px, metric: Metric::Certified },
             time_s: 0.0,
         }
+    }
+
+    /// What the frame needs as the program works it out, from nothing.
+    fn whole_set(&mut self, view: &View) -> WorkingSet {
+        let mut list = DrawList::default();
+        self.room.select(view, &mut list);
+        let wedges = wedges::of_list(&self.field, view, self.room.resident(), &list);
+        let mut set = WorkingSet::new(MAP_LEVEL, Stop::Largest(SLOT_LEVEL));
+        wedges::show(&mut set, view, Cutter::new(view, 1.0, MAP_LEVEL, SLOT_LEVEL), &wedges);
+        set
     }
 
     fn seen(&mut self, view: &View) -> Vec<Seen> {
@@ -222,6 +233,9 @@ fn the_set_is_bounded_by_the_screen() {
         let (mut depths, cutter) = (Depths::new(SIZE, 4.0), Cutter::new(&view, 1.0, MAP_LEVEL, SLOT_LEVEL));
         seen.iter().filter(|s| s.cosine > 0.0).for_each(|s| cutter.cover(&s.corners, &mut depths));
         accounts.iter_mut().for_each(|account| account.follow(&view, &seen, &depths));
+        if frame % 100 == 0 {
+            assert_eq!(flight.whole_set(&view).texels(), accounts[5].set.texels(), "frame {frame}");
+        }
     }
     println!("{WEDGES} wedges, {FRAMES} frames");
     accounts.iter().for_each(Account::print);

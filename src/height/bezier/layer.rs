@@ -37,7 +37,7 @@ impl Ranges {
     }
 }
 
-/// Four coefficients of a cubic along one axis, or fewer of a derivative.
+/// Rows of control points, four of a cubic along an axis or fewer of a derivative.
 type Net<const X: usize, const Z: usize> = [[f64; X]; Z];
 
 /// What is known of the patches of an area, per unit of width.
@@ -151,24 +151,39 @@ fn rates(t: f64) -> [f64; 4] {
     [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, -s * (3.0 * s - 4.0) / 2.0, t * t / 2.0]
 }
 
-/// Control points of a part of a piece of a uniform B-spline of degree N − 1, a derivative's included: its blossom at
-/// the part's ends. A coefficient of a spline of degree n is the blossom at n knots in a row.
-fn part<const N: usize>(coefficients: [f64; N], [a, b]: [f64; 2]) -> [f64; N] {
+/// The Bézier control points of a piece of a uniform cubic B-spline.
+fn bezier_form([a, b, c, d]: [f64; 4]) -> [f64; 4] {
+    [(a + 4.0 * b + c) / 6.0, (2.0 * b + c) / 3.0, (b + 2.0 * c) / 3.0, (b + 4.0 * c + d) / 6.0]
+}
+
+/// Control points of a part of a Bézier curve: its blossom at degree − k times the part's start and k times its end, by
+/// de Casteljau's algorithm.
+fn part<const N: usize>(points: [f64; N], [start, end]: [f64; 2]) -> [f64; N] {
     let degree = N - 1;
     std::array::from_fn(|k| {
-        // The blossom at degree − k times a and k times b, by de Boor's algorithm.
-        let mut values = coefficients;
+        let mut values = points;
         for step in 0..degree {
-            let t = if step < degree - k { a } else { b };
-            let span = (degree - step) as f64;
+            let t = if step < degree - k { start } else { end };
             for i in 0..degree - step {
-                // Knots of coefficient i: i + step − degree + 1 to i + 1.
-                let share = (t - (i as f64 - (degree - step) as f64 + 1.0)) / span;
-                values[i] += share * (values[i + 1] - values[i]);
+                values[i] += t * (values[i + 1] - values[i]);
             }
         }
         values[0]
     })
+}
+
+/// Control points of the derivative of a cubic, and of a quadratic, curve.
+fn derivative_3([a, b, c, d]: [f64; 4]) -> [f64; 3] {
+    [3.0 * (b - a), 3.0 * (c - b), 3.0 * (d - c)]
+}
+
+fn derivative_2([a, b, c]: [f64; 3]) -> [f64; 2] {
+    [2.0 * (b - a), 2.0 * (c - b)]
+}
+
+/// Columns as rows.
+fn turned<const X: usize, const Z: usize>(net: &Net<X, Z>) -> Net<Z, X> {
+    std::array::from_fn(|i| std::array::from_fn(|j| net[j][i]))
 }
 
 /// Least and most of the control points of a part of a net.
@@ -178,26 +193,18 @@ fn ends<const X: usize, const Z: usize>(net: &Net<X, Z>, [x, z]: [[f64; 2]; 2]) 
     columns.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], n| [low.min(n), high.max(n)])
 }
 
-fn hull(net: &Net<4, 4>, area: [[f64; 2]; 2]) -> Hull {
+fn hull(coefficients: &Net<4, 4>, area: [[f64; 2]; 2]) -> Hull {
     let largest = |[low, high]: [f64; 2]| low.abs().max(high.abs());
-    let x: Net<3, 4> = net.map(differences_4);
-    let z: Net<4, 3> = std::array::from_fn(|j| std::array::from_fn(|i| net[j + 1][i] - net[j][i]));
-    let xx: Net<2, 4> = x.map(differences_3);
-    let zz: Net<4, 2> = std::array::from_fn(|j| std::array::from_fn(|i| z[j + 1][i] - z[j][i]));
-    let xz: Net<3, 3> = z.map(differences_4);
-    Hull {
-        value: ends(net, area),
-        largest: [ends(&x, area), ends(&z, area), ends(&xx, area), ends(&zz, area), ends(&xz, area)].map(largest),
-    }
-}
-
-/// The derivative's coefficients: a uniform B-spline's are differences.
-fn differences_4(row: [f64; 4]) -> [f64; 3] {
-    [row[1] - row[0], row[2] - row[1], row[3] - row[2]]
-}
-
-fn differences_3(row: [f64; 3]) -> [f64; 2] {
-    [row[1] - row[0], row[2] - row[1]]
+    let net = turned(&turned(&coefficients.map(bezier_form)).map(bezier_form));
+    let x: Net<3, 4> = net.map(derivative_3);
+    // Turned: rows along z.
+    let z: Net<3, 4> = turned(&net).map(derivative_3);
+    let xx: Net<2, 4> = x.map(derivative_2);
+    let zz: Net<2, 4> = z.map(derivative_2);
+    let xz: Net<3, 3> = turned(&x).map(derivative_3);
+    let across = [area[1], area[0]];
+    let derivatives = [ends(&x, area), ends(&z, across), ends(&xx, area), ends(&zz, across), ends(&xz, across)];
+    Hull { value: ends(&net, area), largest: derivatives.map(largest) }
 }
 
 #[cfg(test)]
@@ -205,28 +212,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn control_points_of_a_whole_piece_are_the_bezier_form() {
+    fn a_part_shrinks_to_the_value_and_the_slope() {
         let c = [3.0, -1.0, 4.0, 1.5];
-        let expected = [
-            (c[0] + 4.0 * c[1] + c[2]) / 6.0,
-            (2.0 * c[1] + c[2]) / 3.0,
-            (c[1] + 2.0 * c[2]) / 3.0,
-            (c[1] + 4.0 * c[2] + c[3]) / 6.0,
-        ];
-        let found = part(c, [0.0, 1.0]);
-        assert!((0..4).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{found:?}, not {expected:?}");
-    }
-
-    #[test]
-    fn a_part_shrinks_to_the_value() {
-        let c = [3.0, -1.0, 4.0, 1.5];
+        let points = bezier_form(c);
+        assert_eq!(part(points, [0.0, 1.0]), points);
         for k in 0..=10 {
             let t = f64::from(k) / 10.0;
             let value: f64 = (0..4).map(|i| c[i] * weights(t)[i]).sum();
             let slope: f64 = (0..4).map(|i| c[i] * rates(t)[i]).sum();
-            assert!(part(c, [t, t]).iter().all(|n| (n - value).abs() < 1e-12));
-            assert!(part(differences_4(c), [t, t]).iter().all(|n| (n - slope).abs() < 1e-12));
+            assert!(part(points, [t, t]).iter().all(|n| (n - value).abs() < 1e-12));
+            assert!(part(derivative_3(points), [t, t]).iter().all(|n| (n - slope).abs() < 1e-12));
         }
+    }
+
+    /// Values and second derivatives found in a patch are in the hull of its part, and come near its ends.
+    #[test]
+    fn a_hull_holds_what_is_found_and_little_more() {
+        let (layer, area) = (Layer::new(4, 16.0, [-3.0, 5.0]), Area { min: [3.0, 5.0], max: [9.0, 14.0] });
+        let ranges = layer.ranges(&area);
+        let (mut found, mut bend) = ([f64::INFINITY, f64::NEG_INFINITY], 0.0f64);
+        for (x, z) in
+            (0..=60).flat_map(|i| (0..=60).map(move |j| (3.0 + 0.1 * f64::from(i), 5.0 + 0.15 * f64::from(j))))
+        {
+            let value = layer.value([x, z]);
+            found = [found[0].min(value), found[1].max(value)];
+            let at = |dx: f64, dz: f64| layer.value([x + dx, z + dz]);
+            for [dx, dz] in [[1e-3, 0.0], [0.0, 1e-3], [7e-4, 7e-4], [7e-4, -7e-4]] {
+                let second = (at(dx, dz) + at(-dx, -dz) - 2.0 * value) / (dx * dx + dz * dz);
+                bend = bend.max(second.abs());
+            }
+        }
+        assert!(ranges.value[0] <= found[0] && found[1] <= ranges.value[1]);
+        assert!(ranges.width() < 1.5 * (found[1] - found[0]), "{ranges:?}, {found:?}");
+        assert!(bend <= ranges.bend + 1e-6 && ranges.bend < 3.0 * bend, "{ranges:?}, {bend}");
     }
 
     #[test]

@@ -26,11 +26,11 @@ const PATCH_M: f64 = 65_536.0;
 const RELIEF_M: [f64; 2] = [0.0, 3600.0];
 /// Width of the patches of the first displacement layer and heights of their control points, ±, metres.
 const FIRST_M: f64 = 16_384.0;
-const FIRST_HEIGHT_M: f64 = 1500.0;
+const FIRST_HEIGHT_M: f64 = 3600.0;
 /// Heights of a layer over those of the one before, whose patches are twice as wide: slopes hardly fade.
-const GAIN: f64 = 0.48;
+const GAIN: f64 = 0.47;
 /// Roughness, which displacement is multiplied by, and the width of its patches.
-const ROUGHNESS: [f64; 2] = [0.02, 1.0];
+const ROUGHNESS: [f64; 2] = [0.1, 1.0];
 const ROUGHNESS_M: f64 = 131_072.0;
 
 /// The most layers of displacement: positions in f64 tell the patches of further ones no more apart.

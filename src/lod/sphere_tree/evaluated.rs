@@ -35,16 +35,16 @@ pub struct Size {
 /// Sizes of diamonds of a land.
 pub struct Evaluated {
     land: Arc<Bezier>,
-    /// What rounding of vertices to single precision may add to an error, metres.
+    /// What rounding of vertices to single precision may add to an error, relative to their heights.
     rounding: f64,
     parts: Vec<RwLock<ByIndex<Size>>>,
 }
 
 impl Evaluated {
-    /// Of a land.
-    pub fn new(land: Arc<Bezier>) -> Self {
-        let [low, high] = land.range_m();
-        let rounding = low.abs().max(high.abs()) * f64::from(ROUNDING);
+    /// Of a land whose vertices come at once, or fade in.
+    pub fn new(land: Arc<Bezier>, fades: bool) -> Self {
+        // One rounding, or those of going from one height to another.
+        let rounding = f64::from(if fades { ROUNDING } else { f32::EPSILON });
         Self { land, rounding, parts: (0..PARTS).map(|_| RwLock::default()).collect() }
     }
 
@@ -87,10 +87,11 @@ impl Evaluated {
         let place = at.map(|n| f64::from(n) * SPACING_M);
         let bounds = self.land.bounds(&Area::about(place, reach * half_m), longest_m);
         let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
+        let rounding_m = bounds.height_m[0].abs().max(bounds.height_m[1].abs()) * self.rounding;
         let ball = (steps_m + bounds.way_m) * f64::from(1.0 + SPARE);
         Size {
             height: self.land.height(place),
-            error: ((bounds.deviation_m + self.rounding) as f32).next_up(),
+            error: ((bounds.deviation_m + rounding_m) as f32).next_up(),
             ball: (ball as f32).next_up(),
         }
     }
@@ -114,7 +115,7 @@ mod tests {
     /// From the root to the last places, down random ways.
     #[test]
     fn errors_and_balls_are_nested_at_every_depth() {
-        let evaluated = Evaluated::new(Arc::new(Bezier::new(7, 24)));
+        let evaluated = Evaluated::new(Arc::new(Bezier::new(7, 24)), true);
         let (lattice, mut dice) = (Lattice::new([LATTICE as i32 - 1; 2]), fastrand::Rng::with_seed(4));
         let spot = |at: Place, size: &Size| {
             glam::DVec3::new(f64::from(at[0]) * SPACING_M, size.height, f64::from(at[1]) * SPACING_M)
@@ -135,7 +136,7 @@ mod tests {
     #[test]
     fn the_land_is_within_a_diamond_s_error_at_every_depth() {
         let land = Arc::new(Bezier::new(7, 24));
-        let (evaluated, mut dice) = (Evaluated::new(Arc::clone(&land)), fastrand::Rng::with_seed(6));
+        let (evaluated, mut dice) = (Evaluated::new(Arc::clone(&land), false), fastrand::Rng::with_seed(6));
         let lattice = Lattice::new([LATTICE as i32 - 1; 2]);
         for level in 0..29 {
             let mut worst = 0f64;

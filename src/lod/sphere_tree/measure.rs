@@ -61,7 +61,7 @@ impl Measured {
     pub fn new(field: Arc<Field>, band: f32) -> Self {
         let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
         if let Some(land) = field.land() {
-            let evaluated = Some(Evaluated::new(Arc::clone(land)));
+            let evaluated = Some(Evaluated::new(Arc::clone(land), band > 1.0));
             let (errors, balls) = (Vec::new(), Vec::new());
             return Self { errors, balls, field, lattice, band, rounding: 0.0, evaluated };
         }

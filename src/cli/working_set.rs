@@ -1,0 +1,127 @@
+//! `cuesta info --working-set`: which nodes of a map over the whole field a view needs, and how fine, as a picture.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use image::{Rgba, RgbaImage};
+use serde::Serialize;
+
+use super::report::save;
+use crate::draw::DrawList;
+use crate::height::{Error, Field};
+use crate::lod::Technique;
+use crate::texture::pieces::Cutter;
+use crate::texture::resolution::texture_area;
+use crate::texture::wedges;
+use crate::texture::working_set::{Node, Stop, WorkingSet};
+use crate::view::View;
+
+/// Side of the picture, pixels.
+const SIDE_PX: u32 = 1024;
+/// Level of the whole map, 2^36 texels, and of a node's texture at most, 32 × 32.
+const MAP_LEVEL: i32 = 18;
+const SLOT_LEVEL: i32 = 5;
+/// Texels a pixel along an axis.
+const QUALITY: f64 = 1.0;
+
+/// What a view needs.
+#[derive(Serialize)]
+pub struct Needed {
+    map_texels: f64,
+    wedges: usize,
+    nodes: usize,
+    texels: f64,
+    texels_a_pixel: f64,
+    /// Nodes by level, from the root's on.
+    levels: Vec<usize>,
+    /// What the picture shows of the field, samples: first ones along (x, z), and how many.
+    shown: [f64; 3],
+}
+
+/// A square of the map: its first corner and its side, shares of the root square.
+struct Window {
+    first: [f64; 2],
+    side: f64,
+}
+
+/// Works out what a view needs, and draws it: each node in the colour of its level, darker where its texture is smaller;
+/// grey is not needed. The picture shows the smallest square around all nodes below the root.
+pub fn draw(field: &Field, technique: &mut dyn Technique, view: &View, path: &Path) -> Result<Needed> {
+    let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+    ensure!(is_png, Error::new(path.display().to_string(), "extension", "expected .png"));
+    let mut list = DrawList::default();
+    technique.select(view, &mut list);
+    let wedges = wedges::of_list(field, view, technique.resident(), &list);
+    let mut set = WorkingSet::new(MAP_LEVEL, Stop::Largest(SLOT_LEVEL));
+    wedges::show(&mut set, view, Cutter::new(view, QUALITY, MAP_LEVEL, SLOT_LEVEL), &wedges);
+    let mut levels = Vec::new();
+    for (node, _) in set.nodes() {
+        levels.resize(levels.len().max(node.level as usize + 1), 0);
+        levels[node.level as usize] += 1;
+    }
+    let window = Window::around(&set);
+    save(path, &picture(&set, &window, levels.len()))?;
+    let root = f64::from(wedges::root_side(field));
+    Ok(Needed {
+        map_texels: texture_area(MAP_LEVEL),
+        wedges: wedges.len(),
+        nodes: set.nodes().count(),
+        texels: set.texels(),
+        texels_a_pixel: set.texels() / f64::from(view.size[0]) / f64::from(view.size[1]),
+        levels,
+        shown: [window.first[0], window.first[1], window.side].map(|share| share * root),
+    })
+}
+
+impl Window {
+    fn around(set: &WorkingSet) -> Self {
+        let side = |node: &Node| 0.5f64.powi(node.level as i32);
+        let ends = |k: usize| {
+            let nodes = set.nodes().map(|(node, _)| node).filter(|node| node.level > 0);
+            nodes.fold([1.0f64, 0.0f64], |[low, high], node| {
+                let first = f64::from(node.at[k]) * side(&node);
+                [low.min(first), high.max(first + side(&node))]
+            })
+        };
+        let ends = [ends(0), ends(1)];
+        let widest = ends.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+        if widest <= 0.0 {
+            return Self { first: [0.0; 2], side: 1.0 };
+        }
+        Self { first: ends.map(|[low, high]| (low + high - widest) / 2.0), side: widest }
+    }
+
+    /// Where a pixel's middle lies on the map.
+    fn at(&self, x: u32, y: u32) -> [f64; 2] {
+        [(0, x), (1, y)].map(|(k, n)| self.first[k] + (f64::from(n) + 0.5) / f64::from(SIDE_PX) * self.side)
+    }
+}
+
+fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
+    let pixel_side = window.side / f64::from(SIDE_PX);
+    RgbaImage::from_fn(SIDE_PX, SIDE_PX, |x, y| {
+        let at = window.at(x, y);
+        let is_on_map = at.iter().all(|part| (0.0..1.0).contains(part));
+        let of_level = |level: u32| {
+            let node = Node { level, at: at.map(|part| (part * f64::from(1u32 << level)) as u32) };
+            Some((node, set.resolution(node)?))
+        };
+        // The finest there is: others lie below it.
+        let found = (0..levels as u32).rev().filter(|_| is_on_map).find_map(of_level);
+        found.map_or(Rgba([40, 40, 40, 255]), |(node, resolution)| colour(node, resolution, at, pixel_side))
+    })
+}
+
+fn colour(node: Node, resolution: u32, at: [f64; 2], pixel_side: f64) -> Rgba<u8> {
+    let side = 0.5f64.powi(node.level as i32);
+    // A line of a pixel around each node that is large enough for it.
+    let is_edge = (0..2).any(|k| at[k] / side - f64::from(node.at[k]) < pixel_side / side) && side > 5.0 * pixel_side;
+    if is_edge {
+        return Rgba([0, 0, 0, 255]);
+    }
+    let light = 0.4 + 0.6 * f64::from(resolution + 1) / f64::from(SLOT_LEVEL + 1);
+    let hue = (f64::from(node.level) * 0.618_034).fract() * 6.0;
+    let part = |shift: f64| (((hue + shift) % 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+    let [r, g, b] = [0.0, 4.0, 2.0].map(|shift| (255.0 * light * (0.25 + 0.75 * part(shift))) as u8);
+    Rgba([r, g, b, 255])
+}
