@@ -109,6 +109,9 @@ impl Entry {
             let Self { name, most_samples, .. } = self;
             return Err(format!("{name}: {w} x {h} samples, and it keeps something of each: at most {most_samples}"));
         }
+        if field.ceiling().is_some() {
+            sorted_strips::cave::can_draw(self.name, settings)?;
+        }
         Ok((self.build)(Arc::clone(field), settings))
     }
 }

@@ -98,7 +98,6 @@ impl<'a> Scene<'a> {
     pub fn stage(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
         let kept = technique.kept();
         let formats = Offscreen::FORMATS;
-        let statistics = self.field.statistics();
         Ok(Stage {
             frames: Frames::new(self.gpu, self.plan.measured)?,
             terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, kept, formats)?,
@@ -110,7 +109,7 @@ impl<'a> Scene<'a> {
             field: Arc::clone(self.field),
             plan: self.plan.clone(),
             look: *self.look,
-            range: [statistics.min, statistics.max],
+            range: self.field.range(),
             time_s: 0.0,
             submission: None,
             list: DrawList::default(),

@@ -56,9 +56,6 @@ fn orthographic(eye: DVec3, world_from_eye: DMat3, width: f64) -> View {
 pub fn sees_everything(field: &Field, view: &View) -> bool {
     let [w, h] = field.size().map(|n| f64::from(n - 1));
     let range = field.statistics();
-    let bounds = Aabb {
-        min: field.world_at(0.0, 0.0, range.min.into()),
-        max: field.world_at(w, h, range.max.into()),
-    };
+    let bounds = Aabb { min: field.world_at(0.0, 0.0, range.min.into()), max: field.world_at(w, h, range.max.into()) };
     view.frustum().contains(&bounds) == Containment::Inside
 }

@@ -84,7 +84,6 @@ impl Stage {
         let (entry, settings) = &setup.technique;
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
-        let statistics = setup.field.statistics();
         Ok(Self {
             terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), technique.kept(), formats)?,
             hud: Hud::new(&gpu, formats)?,
@@ -92,7 +91,7 @@ impl Stage {
             swapchain,
             technique,
             list: DrawList::default(),
-            range: [statistics.min, statistics.max],
+            range: setup.field.range(),
             figures: Figures::default(),
             gpu,
         })

@@ -23,7 +23,7 @@ use super::pages::{Gaze, Grid, Pages, Row};
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::walk::{Ground, Stream, Worker};
-use super::{MOST_PAGES, MOST_TRIANGLES, WIDENING, turn_round};
+use super::{ENTRY, MOST_PAGES, MOST_TRIANGLES, WIDENING, turn_round};
 use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
@@ -45,6 +45,20 @@ pub struct CaveStrips {
     is_back_to_front: bool,
     limits: Limits,
     nothing: Geometry,
+}
+
+/// Whether a technique with these settings draws caves, or why not.
+///
+/// # Errors
+/// One line that says what is expected.
+pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
+    if technique != ENTRY.name {
+        return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
+    }
+    match settings.word("level") {
+        "certified" => Ok(()),
+        level => Err(format!("a ceiling: expected level=certified, found level={level}")),
+    }
 }
 
 /// What a row is made with.

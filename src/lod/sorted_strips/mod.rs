@@ -44,6 +44,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
+use self::cave::CaveStrips;
 use self::certified::{Certified, bounds};
 use self::footprint::Footprint;
 use self::join::{join, starts};
@@ -56,6 +57,7 @@ use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
+use crate::height::cave::Cave;
 use crate::view::{Containment, View};
 
 /// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
@@ -105,7 +107,10 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     most_samples: u64::MAX,
-    build: |field, settings| Box::new(SortedStrips::new(field, settings)),
+    build: |field, settings| match Cave::of(&field) {
+        Some(cave) => Box::new(CaveStrips::new(Arc::new(cave), settings)),
+        None => Box::new(SortedStrips::new(field, settings)),
+    },
 };
 
 struct SortedStrips {
