@@ -127,6 +127,22 @@ pub const TECHNIQUES: &[Entry] = &[
     clusters::ENTRY,
 ];
 
+/// What a tolerance is multiplied by until a list fits.
+const WIDENING: f64 = 1.5;
+
+/// What `select` makes of the view under its tolerance or, where it makes nothing because there is too much, under the first
+/// wider one; and what the tolerance was multiplied by.
+pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
+    let mut wider = *view;
+    loop {
+        if let Some(selected) = select(&wider) {
+            let is_kept = wider.tolerance.px == view.tolerance.px;
+            return (selected, if is_kept { 1.0 } else { wider.tolerance.px / view.tolerance.px });
+        }
+        wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+    }
+}
+
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {
     TECHNIQUES.iter().find(|entry| entry.name == name)

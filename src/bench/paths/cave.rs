@@ -66,7 +66,9 @@ impl Way {
 
     /// The same between floor and ceiling.
     fn eye(&self, ground: &Ground, t: f64) -> DVec3 {
-        let place = self.smooth(t);
+        let (low, high, mean) = (ground.place(0.0, 0.0), ground.place(1.0, 1.0), self.smooth(t));
+        // Means of places at the rim are rounded.
+        let place = DVec3 { x: mean.x.clamp(low[0], high[0]), z: mean.z.clamp(low[1], high[1]), ..mean };
         let (floor, room) = (ground.height([place.x, place.z]), ground.room([place.x, place.z]));
         DVec3 { y: place.y.clamp(floor + NEAREST * room, floor + (1.0 - NEAREST) * room), ..place }
     }

@@ -54,7 +54,7 @@ use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
-use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
@@ -65,8 +65,6 @@ use crate::view::{Containment, View};
 const MOST_TRIANGLES: usize = 1 << 21;
 /// The most pages: beyond it they are made larger.
 const MOST_PAGES: u64 = 1 << 16;
-/// What the tolerance is multiplied by until a frame fits.
-const WIDENING: f64 = 1.5;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -228,11 +226,7 @@ impl SortedStrips {
             std::mem::swap(&mut streamed.indices, indices);
         } else {
             let streams: Vec<&Stream> = workers[..ends.len()].iter().map(|worker| &worker.stream).collect();
-            let vertices: Vec<_> = streams.iter().map(|stream| stream.vertices.as_slice()).collect();
-            let indices: Vec<_> = streams.iter().map(|stream| stream.indices.as_slice()).collect();
-            let bases = starts(vertices.iter().map(|of_row| of_row.len()));
-            join(&vertices, &mut streamed.vertices, |_, vertex| vertex);
-            join(&indices, &mut streamed.indices, |row, index| bases[row] as u32 + index);
+            join_streams(&streams, streamed);
         }
         let mut first = 0;
         for (batch, &end) in (0u32..).zip(ends) {
@@ -247,6 +241,15 @@ impl SortedStrips {
             turn_round(list);
         }
     }
+}
+
+/// All streams, one after the other.
+fn join_streams(streams: &[&Stream], into: &mut Geometry) {
+    let vertices: Vec<_> = streams.iter().map(|stream| stream.vertices.as_slice()).collect();
+    let indices: Vec<_> = streams.iter().map(|stream| stream.indices.as_slice()).collect();
+    let bases = starts(vertices.iter().map(|of_row| of_row.len()));
+    join(&vertices, &mut into.vertices, |_, vertex| vertex);
+    join(&indices, &mut into.indices, |row, index| bases[row] as u32 + index);
 }
 
 /// Turns the order of all triangles round.
@@ -275,17 +278,10 @@ impl Technique for SortedStrips {
         let mut workers = std::mem::take(&mut self.workers);
         let count = if self.is_serial { 1 } else { rows.len() };
         workers.resize_with(count.max(workers.len()), Worker::default);
-        let mut wider = *view;
-        let ends = loop {
-            if let Some(ends) = self.strips(&wider, &gaze, &rows, &mut workers) {
-                break ends;
-            }
-            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
-        };
+        let (ends, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, &mut workers));
         self.fill(&ends, &mut workers, list);
         self.workers = workers;
-        list.widening =
-            if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px };
+        list.widening = widening;
     }
 
     fn keeps_tolerance(&self) -> bool {

@@ -42,7 +42,7 @@ use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
 use self::shells::Shells;
 use self::splits::{Found, Splits};
-use super::{Entry, Setting, Settings, Technique, Values};
+use super::{Entry, Setting, Settings, Technique, Values, widened};
 use crate::draw::{DrawList, Geometry, Limits};
 use crate::height::Field;
 use crate::view::View;
@@ -53,8 +53,6 @@ const BAND: f32 = 1.3;
 const HOLD: f64 = 1.1;
 /// The most diamonds that split, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
 const MOST_SPLITS: usize = 1 << 20;
-/// What the tolerance is multiplied by until a frame fits.
-const WIDENING: f64 = 1.5;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -169,18 +167,12 @@ impl Technique for SphereTree {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        let mut wider = *view;
-        let from = loop {
-            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&wider));
+        let (from, widening) = widened(view, |wider| {
+            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(wider));
             let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
-            if self.criterion.follow(&self.measured, &from, MOST_SPLITS) {
-                break from;
-            }
-            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
-        };
-        if wider.tolerance.px != view.tolerance.px {
-            list.widening = wider.tolerance.px / view.tolerance.px;
-        }
+            self.criterion.follow(&self.measured, &from, MOST_SPLITS).then_some(from)
+        });
+        list.widening = widening;
         self.blocks.look(view);
         let Self { measured, blocks, criterion, .. } = self;
         Mesh { measured, splits: criterion.splits(), blocks, from: &from }.fill(list);
