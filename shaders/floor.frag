@@ -23,5 +23,5 @@ void main() {
     vec4 point = in_far + depth * in_near;
     vec3 relative = point.xyz / point.w;
     vec2 lattice = (relative.xz - frame.anchor_relative) / frame.spacing;
-    out_colour = vec4(land_colour(relative, lattice, normal_at(lattice, pixel_at(relative)), uvec2(0)), 1.0);
+    out_colour = vec4(land_colour(relative, lattice, normal_at(relative, lattice), uvec2(0)), 1.0);
 }

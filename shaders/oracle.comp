@@ -11,7 +11,7 @@ layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
 layout(constant_id = 3) const bool HOLES = false;
 
 layout(set = 1, binding = 0, scalar) readonly buffer CapturedBlock { Captured captured[]; };
-// Three records a triangle, counter-clockwise seen from above.
+// Three records a triangle; those of a ceiling are clockwise seen from above.
 layout(set = 1, binding = 1, scalar) readonly buffer TriangleBlock { uvec3 triangles[]; };
 layout(set = 1, binding = 2, scalar) writeonly buffer ErrorBlock { TriangleError errors[]; };
 // Counted errors by the upper 12 bits of their value: 16 classes an octave. Metres, then pixels.
@@ -49,6 +49,12 @@ void main() {
     uvec3 corners = triangles[k];
     Captured a = captured[corners.x], b = captured[corners.y], c = captured[corners.z];
     int area = doubled_area(a.position, b.position, c.position);
+    bool faces_down = area < 0;
+    if (faces_down) {
+        b = captured[corners.z];
+        c = captured[corners.y];
+        area = -area;
+    }
     TriangleError found = TriangleError(0, 0.0, 0.0, 0.0, 0.0);
     ivec2 first = min(a.position, min(b.position, c.position));
     ivec2 last = max(a.position, max(b.position, c.position));
@@ -59,7 +65,7 @@ void main() {
                                   doubled_area(a.position, b.position, at));
             if (any(lessThan(weights, ivec3(0)))) continue;
             if (HOLES && texelFetch(hole_pages, texel(at), 0).r != 0) continue;
-            float truth = sample_height(at);
+            float truth = surface_height(at, faces_down);
             // Relative to the sample: heights nearly cancel before they are rounded.
             vec3 above = vec3(a.height, b.height, c.height) - truth;
             float metres = dot(vec3(weights), above) / float(area);

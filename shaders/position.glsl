@@ -22,6 +22,12 @@ float sample_height(ivec2 at) {
     return decoded_height(texelFetch(height_pages, texel(at), 0).r);
 }
 
+// The same of the field, or of the ceiling over it.
+float surface_height(ivec2 at, bool is_ceiling) {
+    if (CEILING && is_ceiling) return decoded_height(texelFetch(ceiling_pages, texel(at), 0).r);
+    return sample_height(at);
+}
+
 // Lattice position, height in metres, level of detail.
 struct Placed { ivec2 at; float height; uint level; };
 

@@ -34,11 +34,11 @@ bool in_hole(Cell cell) {
 }
 
 // Height of the samples' own surface.
-float true_height(Cell cell) {
-    float h00 = sample_height(cell.at);
-    float h10 = sample_height(cell.at + ivec2(1, 0));
-    float h01 = sample_height(cell.at + ivec2(0, 1));
-    float h11 = sample_height(cell.at + ivec2(1));
+float true_height(Cell cell, bool is_ceiling) {
+    float h00 = surface_height(cell.at, is_ceiling);
+    float h10 = surface_height(cell.at + ivec2(1, 0), is_ceiling);
+    float h01 = surface_height(cell.at + ivec2(0, 1), is_ceiling);
+    float h11 = surface_height(cell.at + ivec2(1), is_ceiling);
     vec2 p = cell.inside;
     if (cell.falling) {
         return p.x >= p.y ? h00 + p.x * (h10 - h00) + p.y * (h11 - h10) : h00 + p.y * (h01 - h00) + p.x * (h11 - h01);
@@ -47,22 +47,39 @@ float true_height(Cell cell) {
                             : h11 + (1.0 - p.x) * (h01 - h11) + (1.0 - p.y) * (h10 - h11);
 }
 
-float linear_height(vec2 lattice) {
+float linear_height(vec2 lattice, bool is_ceiling) {
     if (FILTERED) {
-        vec2 uv = (lattice + vec2(frame.anchor_stored) + 0.5) / vec2(frame.stored);
-        float stored = textureLod(height_pages, vec3(uv, 0.0), 0.0).r;
+        vec3 uv = vec3((lattice + vec2(frame.anchor_stored) + 0.5) / vec2(frame.stored), 0.0);
+        float stored = CEILING && is_ceiling ? textureLod(ceiling_pages, uv, 0.0).r : textureLod(height_pages, uv, 0.0).r;
         return CODED ? (stored * 65535.0 - frame.height_zero) * frame.height_scale : stored;
     }
     ivec2 at = clamp(ivec2(floor(lattice)) + frame.anchor, ivec2(0), frame.last - 1);
     vec2 p = clamp(lattice - vec2(at - frame.anchor), 0.0, 1.0);
-    float north = mix(sample_height(at), sample_height(at + ivec2(1, 0)), p.x);
-    float south = mix(sample_height(at + ivec2(0, 1)), sample_height(at + ivec2(1)), p.x);
+    float north = mix(surface_height(at, is_ceiling), surface_height(at + ivec2(1, 0), is_ceiling), p.x);
+    float south = mix(surface_height(at + ivec2(0, 1), is_ceiling), surface_height(at + ivec2(1), is_ceiling), p.x);
     return mix(north, south, p.y);
 }
 
+// Size of a pixel at a point relative to the eye, metres.
+float pixel_at(vec3 relative) {
+    return frame.pixel_slope * length(relative) + frame.pixel_size;
+}
+
+// Height of a point relative to the eye, metres.
+float height_of(vec3 relative) {
+    return (relative.y - frame.anchor_height_relative) + frame.anchor_height;
+}
+
+// Whether a point of the drawn surface is the ceiling's: nearer to it than to the floor.
+bool is_of_ceiling(vec3 relative, vec2 lattice) {
+    return CEILING && 2.0 * height_of(relative) > linear_height(lattice, false) + linear_height(lattice, true);
+}
+
 // Normal from central differences, with the true spacing on both axes. The differences widen with the size
-// of a pixel on the ground, so that far land does not glitter.
-vec3 normal_at(vec2 lattice, float pixel) {
+// of a pixel on the ground, so that far land does not glitter. A ceiling's points down.
+vec3 normal_at(vec3 relative, vec2 lattice) {
+    bool is_ceiling = is_of_ceiling(relative, lattice);
+    float pixel = pixel_at(relative);
     vec2 reach = max(vec2(1.0), pixel / frame.spacing);
     vec2 last = vec2(frame.last - frame.anchor);
     vec2 first = vec2(-frame.anchor);
@@ -70,9 +87,10 @@ vec3 normal_at(vec2 lattice, float pixel) {
     vec2 east = vec2(min(lattice.x + reach.x, last.x), lattice.y);
     vec2 north = vec2(lattice.x, max(lattice.y - reach.y, first.y));
     vec2 south = vec2(lattice.x, min(lattice.y + reach.y, last.y));
-    float slope_x = (linear_height(west) - linear_height(east)) / ((east.x - west.x) * frame.spacing.x);
-    float slope_z = (linear_height(north) - linear_height(south)) / ((south.y - north.y) * frame.spacing.y);
-    return normalize(vec3(slope_x, 1.0, slope_z));
+    float slope_x = (linear_height(west, is_ceiling) - linear_height(east, is_ceiling)) / ((east.x - west.x) * frame.spacing.x);
+    float slope_z = (linear_height(north, is_ceiling) - linear_height(south, is_ceiling)) / ((south.y - north.y) * frame.spacing.y);
+    vec3 normal = normalize(vec3(slope_x, 1.0, slope_z));
+    return is_ceiling ? -normal : normal;
 }
 
 // From 0 at the lowest sample to 1 at the highest.
@@ -88,6 +106,23 @@ vec3 tint(float height, vec3 normal) {
     colour = mix(colour, vec3(0.34, 0.32, 0.31), smoothstep(0.5, 0.75, t));
     colour = mix(colour, vec3(0.86, 0.89, 0.93), smoothstep(0.78, 0.92, t));
     return mix(vec3(0.25, 0.22, 0.20), colour, smoothstep(0.45, 0.75, normal.y));
+}
+
+// Limestone in layers.
+vec3 rock(float height) {
+    float layer = 0.5 + 0.5 * sin(height * 1.7 + 1.3 * sin(height * 0.41));
+    return mix(vec3(0.34, 0.28, 0.22), vec3(0.56, 0.50, 0.42), layer);
+}
+
+// How far the lamp at the eye reaches in a cave, metres.
+const float LAMP_REACH = 25.0;
+
+// Light of that lamp, and a little from all around.
+vec3 lamplight(vec3 relative, float distance, vec3 normal) {
+    float facing = max(dot(normal, -relative) / max(distance, 1e-30), 0.0);
+    float far = distance / LAMP_REACH;
+    vec3 around = mix(vec3(0.05, 0.045, 0.04), vec3(0.07, 0.08, 0.10), normal.y * 0.5 + 0.5);
+    return vec3(1.75, 1.5, 1.15) * facing / (1.0 + far * far) + around;
 }
 
 // Well separated hues for small integers.
@@ -108,17 +143,12 @@ bool is_open(vec2 lattice) {
     return HOLES && in_hole(cell_at(lattice));
 }
 
-// Size of a pixel at a point relative to the eye, metres.
-float pixel_at(vec3 relative) {
-    return frame.pixel_slope * length(relative) + frame.pixel_size;
-}
-
 // Colour of the surface at a point relative to the eye over a lattice position relative to the anchor.
 vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
     Cell cell = cell_at(lattice);
     float distance = length(relative);
     float pixel = pixel_at(relative);
-    float height = (relative.y - frame.anchor_height_relative) + frame.anchor_height;
+    float height = height_of(relative);
 
     vec3 albedo;
     vec3 ground = vec3(0.0);
@@ -129,15 +159,18 @@ vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
     }
     if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
     else if (COLOUR == 2) albedo = texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
-    else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell)) / max(pixel, 1e-30));
+    else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
     else if (COLOUR == 5) albedo = palette(level_batch.y);
-    else albedo = DETAIL ? ground : tint(height, normal);
+    else if (DETAIL) albedo = ground;
+    else albedo = CEILING ? rock(height) : tint(height, normal);
     // Under a picture from above the ground is lighter or darker than it is on average.
     if (DETAIL && COLOUR == 2) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
 
     vec3 colour = albedo;
     if (COLOUR == 4) {
         colour = normal * 0.5 + 0.5;
+    } else if (CEILING) {
+        colour *= lamplight(relative, distance, normal);
     } else {
         float sun = max(dot(normal, frame.sun), 0.0);
         vec3 ambient = mix(vec3(0.16, 0.15, 0.14), vec3(0.28, 0.34, 0.45), normal.y * 0.5 + 0.5);

@@ -22,7 +22,7 @@ void main() {
 #ifdef NORMALS
     vec3 normal = normalize(in_normal);
 #else
-    vec3 normal = normal_at(in_lattice, pixel_at(in_relative));
+    vec3 normal = normal_at(in_relative, in_lattice);
 #endif
     out_colour = vec4(land_colour(in_relative, in_lattice, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
 }

@@ -71,6 +71,8 @@ pub struct ScenePlan {
     pub tiled: bool,
     /// Some samples have no data.
     pub holes: bool,
+    /// A ceiling lies over the field: its heights are there, and a lamp at the eye lights both.
+    pub ceiling: bool,
     /// Fog is computed.
     pub fog: bool,
     /// What colours say; `Overlay` keeps a picture.
@@ -111,6 +113,7 @@ impl ScenePlan {
             coded: matches!(field.samples(), Samples::Coded { .. }),
             tiled: field.is_tiled(),
             holes: field.holes().count() > 0,
+            ceiling: field.ceiling().is_some(),
             fog: look.fog > 0.0,
             // Without samples there is nothing to be compared with.
             colour: if is_endless && look.colour == Colour::Error { Colour::Height } else { look.colour },
@@ -182,6 +185,13 @@ impl ScenePlan {
                 2 * samples,
             ),
             sort(self.holes, "hole mask", &holes, "every sample has data", samples),
+            sort(
+                self.ceiling,
+                "ceiling",
+                "the field is the floor of a cave",
+                "nothing lies over the field",
+                self.texel_bytes() * samples,
+            ),
             sort(self.tiled, "tiling", "the field repeats", "the field does not repeat", 0),
             sort(self.page_shift > 0, "height pages", "the field exceeds one image", "one image holds the field", 0),
             sort(!self.filtered, "filtering in the shader", "the device cannot", "the device's sampler does it", 0),

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
@@ -15,12 +15,9 @@ use super::scene::{TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, report};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
-use crate::height::cave::Cave;
 use crate::height::save::{Out, replace};
 use crate::height::surface::Corner;
 use crate::height::{Error, Field, surface};
-use crate::lod::Technique;
-use crate::lod::sorted_strips::cave::CaveStrips;
 
 /// Arguments.
 #[derive(Args, Debug)]
@@ -28,10 +25,6 @@ pub struct ExportArgs {
     /// Where heights come from.
     #[command(flatten)]
     pub terrain: TerrainArgs,
-    /// A ceiling over the terrain, read alike: together they are a cave, with rock where the ceiling is not above the
-    /// floor. For --technique sorted-strips.
-    #[arg(long, value_name = "FILE")]
-    pub ceiling: Option<String>,
     /// Where to: .ply, .obj or .glb.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -69,10 +62,7 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
         };
     let field = Arc::new(args.terrain.load(common)?.field);
     let view = args.view.build(&field, args.technique.tolerance()?)?;
-    let mut technique = match &args.ceiling {
-        Some(ceiling) => cave_strips(common, args, &field, ceiling)?,
-        None => args.technique.build(common, &field)?,
-    };
+    let mut technique = args.technique.build(common, &field)?;
     let mut list = DrawList::default();
     technique.select(&view, &mut list);
     let mut mesh = MeshBuilder::new(&field);
@@ -84,21 +74,6 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
         .map_err(|e| Error::new(args.output.display().to_string(), "file", e))?;
     report::print(common, &Exported { triangles: mesh.triangles.len(), vertices: mesh.positions.len() })?;
     Ok(Outcome::Done)
-}
-
-/// Strips over a floor and a ceiling.
-fn cave_strips(common: &Common, args: &ExportArgs, floor: &Field, ceiling: &str) -> Result<Box<dyn Technique>> {
-    let (entry, settings) = args.technique.settings()?;
-    if entry.name != "sorted-strips" {
-        bail!("--ceiling: expected --technique sorted-strips, found {}", entry.name);
-    }
-    if settings.word("level") != "certified" {
-        bail!("--ceiling: expected level=certified, found level={}", settings.word("level"));
-    }
-    let loaded = args.terrain.reading.load(common, ceiling)?;
-    let cave = Cave::new(floor, &loaded.field, ceiling)?;
-    let _spinner = report::preparing(common, entry.name, &settings.progress);
-    Ok(Box::new(CaveStrips::new(Arc::new(cave), &settings)))
 }
 
 /// Collects triangles and shares their vertices.

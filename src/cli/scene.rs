@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{Common, endless, report};
+use crate::height::cave::Cave;
 use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Look};
@@ -38,6 +39,10 @@ pub struct ReadArgs {
     /// The file is bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
     #[arg(long, value_name = "LAYOUT")]
     pub raw: Option<RawLayout>,
+    /// A ceiling over the field, read alike: together they are a cave, with rock where the ceiling is not above the
+    /// floor. For sorted-strips.
+    #[arg(long, value_name = "FILE")]
+    pub ceiling: Option<String>,
     /// The part to keep, in samples.
     #[arg(long, value_name = "X,Z,W,H", value_parser = numbers::<u32, 4>)]
     pub crop: Option<[u32; 4]>,
@@ -240,8 +245,17 @@ fn encoding(text: &str) -> Result<Encoding, String> {
 }
 
 impl ReadArgs {
-    /// Reads a field, and says what the reader warns of.
+    /// Reads a field, and the ceiling over it if there is one, and says what the reader warns of.
     pub fn load(&self, common: &Common, terrain: &str) -> Result<Loaded> {
+        let mut loaded = self.load_alone(common, terrain)?;
+        if let Some(file) = &self.ceiling {
+            let ceiling = self.load_alone(common, file)?;
+            loaded.field = Field::clone(Cave::new(&loaded.field, &ceiling.field, file)?.floor());
+        }
+        Ok(loaded)
+    }
+
+    fn load_alone(&self, common: &Common, terrain: &str) -> Result<Loaded> {
         let options = Options {
             spacing: self.spacing,
             height_scale: self.height_scale,

@@ -16,8 +16,20 @@ const STAGING: u64 = 32 << 20;
 
 /// The field's heights as an array of pages.
 pub fn heights(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
+    surface(gpu, plan, "heights", field)
+}
+
+/// The heights of a cave's ceiling, alike; a stand-in of one texel where there is none.
+pub fn ceiling(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
+    match field.ceiling().filter(|_| plan.ceiling) {
+        Some(ceiling) => surface(gpu, plan, "ceiling", ceiling),
+        None => picture(gpu, "no ceiling", vk::Format::R32_SFLOAT, [1, 1], true, &[0; 4]),
+    }
+}
+
+fn surface(gpu: &Arc<Gpu>, plan: &ScenePlan, purpose: &'static str, field: &Field) -> Result<Image> {
     let format = if plan.coded { vk::Format::R16_UNORM } else { vk::Format::R32_SFLOAT };
-    paged(gpu, plan, "heights", format, plan.texel_bytes(), |first, count, row| match field.samples() {
+    paged(gpu, plan, purpose, format, plan.texel_bytes(), |first, count, row| match field.samples() {
         Samples::F32(heights) => row.extend_from_slice(bytemuck::cast_slice(&heights[first..first + count])),
         Samples::Coded { codes, .. } => row.extend_from_slice(bytemuck::cast_slice(&codes[first..first + count])),
     })

@@ -10,6 +10,7 @@ use ash::vk;
 use super::device::Gpu;
 use super::shaders::{self, Constants};
 use super::target::Formats;
+use super::terrain::IMAGES;
 use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 use crate::draw::{Normals, Source, Topology};
 use crate::plan::ScenePlan;
@@ -31,8 +32,8 @@ pub struct Pipelines {
 impl Pipelines {
     /// Makes the pipelines for a plan, drawing to these formats.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, formats: Formats) -> Result<Self> {
-        let image = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
-        let kinds = [vk::DescriptorType::UNIFORM_BUFFER, image, image, image, image];
+        let images = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; IMAGES];
+        let kinds = std::iter::once(vk::DescriptorType::UNIFORM_BUFFER).chain(images);
         let bindings: Vec<_> = (0u32..)
             .zip(kinds)
             .map(|(binding, kind)| {

@@ -61,6 +61,7 @@ impl Constants {
             flag(plan.detail),
             flag(plan.manner.morph == Morph::ByDistance),
             flag(plan.stored.iter().all(|n| n.is_power_of_two())),
+            flag(plan.ceiling),
         ])
     }
 

@@ -28,8 +28,8 @@ pub struct Terrain {
     resident: Resident,
     slots: Vec<Slot>,
     descriptors: vk::DescriptorPool,
-    samplers: [vk::Sampler; 4],
-    images: [Image; 4],
+    samplers: [vk::Sampler; IMAGES],
+    images: [Image; IMAGES],
     driven: Option<Driven>,
 }
 
@@ -55,6 +55,9 @@ struct Slot {
     staging: Buffer,
 }
 
+/// Sampled images of a scene.
+pub(super) const IMAGES: usize = 5;
+
 /// Bytes of an indexed indirect command.
 pub(super) const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
 
@@ -74,6 +77,7 @@ impl Terrain {
             pages::holes(gpu, plan, field)?,
             pages::overlay(gpu, overlay)?,
             materials::image(gpu, plan)?,
+            pages::ceiling(gpu, plan, field)?,
         ];
         let heights = if !plan.filtered {
             Sampling::Texels
@@ -87,6 +91,7 @@ impl Terrain {
             pages::sampler(gpu, Sampling::Texels)?,
             pages::sampler(gpu, Sampling::Clamped)?,
             pages::sampler(gpu, Sampling::Repeated)?,
+            pages::sampler(gpu, heights)?,
         ];
         let descriptors = descriptor_pool(gpu)?;
         let resident = Resident::new(gpu, kept.geometry)?;
@@ -426,7 +431,7 @@ impl Slot {
         }
     }
 
-    fn describe(&self, gpu: &Gpu, images: &[Image; 4], samplers: [vk::Sampler; 4]) {
+    fn describe(&self, gpu: &Gpu, images: &[Image; IMAGES], samplers: [vk::Sampler; IMAGES]) {
         let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let infos: Vec<_> = images
@@ -450,7 +455,10 @@ fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
     let slots = SLOTS as u32;
     let sizes = [
         vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
-        vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 4 * slots },
+        vk::DescriptorPoolSize {
+            ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            descriptor_count: IMAGES as u32 * slots,
+        },
     ];
     let info = vk::DescriptorPoolCreateInfo::default().max_sets(slots).pool_sizes(&sizes);
     // SAFETY: the device is alive; Drop destroys the pool.

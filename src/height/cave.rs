@@ -48,16 +48,23 @@ impl Cave {
         let no_data = |k: usize| floor.holes.contains(k) || ceiling.holes.contains(k);
         let is_rock: Vec<bool> = (0..low.len()).map(|k| high[k] <= low[k] || no_data(k)).collect();
         let between = meeting(floor, &low, &high, &is_rock);
-        let welded = |heights: Vec<f32>| {
+        let welded = |heights: Vec<f32>, ceiling: Option<Arc<Field>>| {
             let height = |k: usize| if is_rock[k] { between.samples.height(k) } else { heights[k] };
             let samples = Samples::F32((0..heights.len()).map(height).collect());
             let holes = Holes::none(heights.len());
-            Arc::new(Field { samples, holes, source: None, ..floor.clone() })
+            Arc::new(Field { samples, holes, source: None, ceiling, ..floor.clone() })
         };
-        Self { floor: welded(low), ceiling: welded(high) }
+        let ceiling = welded(high, None);
+        Self { floor: welded(low, Some(Arc::clone(&ceiling))), ceiling }
     }
 
-    /// The floor.
+    /// The cave that a field is the floor of.
+    pub fn of(floor: &Arc<Field>) -> Option<Self> {
+        let ceiling = Arc::clone(floor.ceiling()?);
+        Some(Self { floor: Arc::clone(floor), ceiling })
+    }
+
+    /// The floor, which knows its ceiling: it stands for the cave wherever a field is asked for.
     pub fn floor(&self) -> &Arc<Field> {
         &self.floor
     }

@@ -191,6 +191,7 @@ pub struct Field {
     /// The file that it was read from, if what takes long to work out of it may be kept beside that.
     pub source: Option<PathBuf>,
     land: Option<Arc<Bezier>>,
+    ceiling: Option<Arc<Field>>,
 }
 
 /// Lowest, highest and mean height of the samples that are no holes, metres.
@@ -214,7 +215,8 @@ impl Field {
         assert_eq!(samples.len(), x_count as usize * z_count as usize);
         assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
         let (stored, tiles, origin) = ([x_count, z_count], [1, 1], [0.0, 0.0]);
-        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs: None, source: None, land: None };
+        let (crs, source, land, ceiling) = (None, None, None, None);
+        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs, source, land, ceiling };
         field.fill_holes();
         field
     }
@@ -261,6 +263,18 @@ impl Field {
     /// The holes among the samples held in memory.
     pub fn holes(&self) -> &Holes {
         &self.holes
+    }
+
+    /// What lies over it, where it is the floor of a [cave](cave::Cave).
+    pub fn ceiling(&self) -> Option<&Arc<Field>> {
+        self.ceiling.as_ref()
+    }
+
+    /// Lowest and highest height of what is there, a ceiling included, metres.
+    pub fn range(&self) -> [f32; 2] {
+        let own = |field: &Field| field.statistics();
+        let (floor, ceiling) = (own(self), self.ceiling().map(|ceiling| own(ceiling)));
+        ceiling.map_or([floor.min, floor.max], |over| [floor.min.min(over.min), floor.max.max(over.max)])
     }
 
     /// Whether the field repeats.

@@ -115,6 +115,9 @@ impl Entry {
         if field.land().is_none() && w * h > self.most_samples {
             return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
         }
+        if field.ceiling().is_some() {
+            sorted_strips::cave::can_draw(self.name, settings)?;
+        }
         Ok((self.build)(Arc::clone(field), settings))
     }
 }
@@ -129,6 +132,22 @@ pub const TECHNIQUES: &[Entry] = &[
     sphere_tree::ENTRY,
     clusters::ENTRY,
 ];
+
+/// What a tolerance is multiplied by until a list fits.
+const WIDENING: f64 = 1.5;
+
+/// What `select` makes of the view under its tolerance or, where it makes nothing because there is too much, under the first
+/// wider one; and what the tolerance was multiplied by.
+pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
+    let mut wider = *view;
+    loop {
+        if let Some(selected) = select(&wider) {
+            let is_kept = wider.tolerance.px == view.tolerance.px;
+            return (selected, if is_kept { 1.0 } else { wider.tolerance.px / view.tolerance.px });
+        }
+        wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+    }
+}
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {

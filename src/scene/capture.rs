@@ -55,17 +55,18 @@ impl Stage {
                 oracle = Some(Oracle::new(&stage.gpu, &stage.plan, stage.terrain.set_layout(), capture)?);
             }
             let oracle = oracle.as_mut().expect("just made");
-            let mut facing_up = Vec::new();
+            let mut surface = Vec::new();
             for part in batch {
                 let geometry = expand::geometry(part.draw.source, resident, list);
-                triangles(geometry, part, records, |drawn, [a, b, c]| match doubled_area(&drawn.corners) {
+                triangles(geometry, part, records, |drawn, corners| {
                     // Skirts are no part of the surface.
-                    0 => {}
-                    area => facing_up.push(if area > 0 { [a, b, c] } else { [a, c, b] }),
+                    if doubled_area(&drawn.corners) != 0 {
+                        surface.push(corners);
+                    }
                 });
             }
             let frame = stage.look.frame(&stage.field, view, stage.range);
-            for some in facing_up.chunks(oracle::TRIANGLES) {
+            for some in surface.chunks(oracle::TRIANGLES) {
                 let mut recording = stage.frames.begin()?;
                 stage.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
                 let scene = stage.terrain.scene_set(&recording);

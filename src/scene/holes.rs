@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::Scene;
 use crate::height::Field;
-use crate::lod::{self, Settings, Technique};
+use crate::lod::{self, Settings, Technique, sorted_strips};
 use crate::measure::picture;
-use crate::view::View;
+use crate::view::{Tolerance, View};
+
+/// A tolerance at which what is not drawn is never seen, pixels.
+const EXACT_PX: f64 = 1e-3;
 
 /// A view as brute force draws it: what other pictures of the view are held against.
 pub struct Truth {
@@ -63,9 +66,15 @@ pub fn covered(picture: &image::RgbaImage) -> Vec<bool> {
     picture.pixels().map(|p| p.0[3] > 0).collect()
 }
 
+/// Every sample. A cave's are what the one technique that draws caves makes of them at next to no tolerance.
 fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::RgbaImage> {
-    let entry = lod::find("brute-force").expect("in the table");
+    let is_cave = field.ceiling().is_some();
+    let entry = lod::find(if is_cave { sorted_strips::ENTRY.name } else { "brute-force" }).expect("in the table");
     let mut technique: Box<dyn Technique> = (entry.build)(Arc::clone(field), &Settings::defaults(entry));
     let plan = scene.plan.clone().with_manner(technique.manner());
-    Ok(Scene { field, plan: &plan, ..scene.clone() }.shoot(technique.as_mut(), view, 1)?.picture)
+    let tolerance = Tolerance { px: if is_cave { EXACT_PX } else { view.tolerance.px }, ..view.tolerance };
+    let view = View { tolerance, ..*view };
+    let shot = Scene { field, plan: &plan, ..scene.clone() }.shoot(technique.as_mut(), &view, 1)?;
+    ensure!(!is_cave || shot.list.widening == 1.0, "the cave has too many samples in sight for a picture of all");
+    Ok(shot.picture)
 }

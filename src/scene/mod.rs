@@ -106,7 +106,6 @@ impl<'a> Scene<'a> {
         if self.plan.has_depth() {
             offscreen.add_depth(self.gpu)?;
         }
-        let statistics = self.field.statistics();
         Ok(Stage {
             frames: Frames::new(self.gpu, self.plan.measured)?,
             terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, kept, formats)?,
@@ -119,7 +118,7 @@ impl<'a> Scene<'a> {
             field: Arc::clone(self.field),
             plan: self.plan.clone(),
             look: *self.look,
-            range: [statistics.min, statistics.max],
+            range: self.field.range(),
             time_s: 0.0,
             submission: None,
             list: DrawList::default(),

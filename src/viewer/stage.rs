@@ -85,7 +85,6 @@ impl Stage {
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         swapchain.set_depth(plan.has_depth())?;
         let formats = swapchain.formats();
-        let statistics = setup.field.statistics();
         Ok(Self {
             terrain: Terrain::new(&gpu, &plan, &setup.field, setup.overlay.as_ref(), technique.kept(), formats)?,
             hud: Hud::new(&gpu, formats)?,
@@ -93,7 +92,7 @@ impl Stage {
             swapchain,
             technique,
             list: DrawList::default(),
-            range: [statistics.min, statistics.max],
+            range: setup.field.range(),
             figures: Figures::default(),
             gpu,
         })

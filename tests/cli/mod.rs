@@ -193,7 +193,7 @@ fn wrong_use_is_one_line_and_exit_code_2() {
     refused(at, &["info", "demo", "--crop", "0,0,5000,5"], &["crop"]);
     refused(at, &["info", "demo", "--max-samples", "1000"], &["--max-samples"]);
     refused(at, &["export", "demo", "-o", "m.stl"], &["m.stl", ".ply"]);
-    refused(at, &["export", "demo", "-o", "m.ply", "--ceiling", "demo"], &["--ceiling", "sorted-strips", "geomipmap"]);
+    refused(at, &["export", "demo", "-o", "m.ply", "--ceiling", "demo"], &["ceiling", "sorted-strips", "geomipmap"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--technique", "magic"], &["magic", "geomipmap"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--technique", "geomipmap:magic"], &["magic", "draw-per-block"]);
     refused(at, &["export", "demo", "-o", "m.ply", "--set", "block=66"], &["block=66", "65"]);

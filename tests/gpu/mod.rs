@@ -3,6 +3,7 @@
 
 mod bench;
 mod capture;
+mod cave;
 mod detail;
 mod driven;
 mod endless;

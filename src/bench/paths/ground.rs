@@ -24,18 +24,24 @@ impl<'a> Ground<'a> {
 
     /// Height at a world position (x, z), bilinear; outside, that of the border. Holes are filled.
     pub fn height(&self, at: [f64; 2]) -> f64 {
-        let [u, v] = [0, 1].map(|k| (at[k] - self.field.origin[k]) / self.field.spacing[k]);
-        self.height_of_sample([u, v])
+        self.height_of_sample(self.sample(at))
+    }
+
+    /// Height of what a person can be in over a world position (x, z): up to the ceiling, if there is one, metres.
+    pub fn room(&self, at: [f64; 2]) -> f64 {
+        match self.field.ceiling() {
+            Some(ceiling) => bilinear(ceiling, self.sample(at)) - self.height(at),
+            None => 2.0 * self.eye_height(),
+        }
+    }
+
+    fn sample(&self, at: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| (at[k] - self.field.origin[k]) / self.field.spacing[k])
     }
 
     /// Height at a position in samples, bilinear; outside, that of the border.
     pub fn height_of_sample(&self, at: [f64; 2]) -> f64 {
-        let last = self.field.size().map(|n| n - 1);
-        let clamped = [0, 1].map(|k| at[k].clamp(0.0, f64::from(last[k])));
-        let low = [0, 1].map(|k| (clamped[k] as u32).min(last[k] - 1));
-        let [u, v] = [0, 1].map(|k| clamped[k] - f64::from(low[k]));
-        let height = |i: u32, j: u32| f64::from(self.field.height(low[0] + i, low[1] + j));
-        (height(0, 0) * (1.0 - u) + height(1, 0) * u) * (1.0 - v) + (height(0, 1) * (1.0 - u) + height(1, 1) * u) * v
+        bilinear(self.field, at)
     }
 
     /// World position (x, z) of a place given in parts of the field's extent.
@@ -76,4 +82,13 @@ impl<'a> Ground<'a> {
     pub fn near(&self) -> f64 {
         0.1f64.min(self.extent() / 1000.0)
     }
+}
+
+fn bilinear(field: &Field, at: [f64; 2]) -> f64 {
+    let last = field.size().map(|n| n - 1);
+    let clamped = [0, 1].map(|k| at[k].clamp(0.0, f64::from(last[k])));
+    let low = [0, 1].map(|k| (clamped[k] as u32).min(last[k] - 1));
+    let [u, v] = [0, 1].map(|k| clamped[k] - f64::from(low[k]));
+    let height = |i: u32, j: u32| f64::from(field.height(low[0] + i, low[1] + j));
+    (height(0, 0) * (1.0 - u) + height(1, 0) * u) * (1.0 - v) + (height(0, 1) * (1.0 - u) + height(1, 1) * u) * v
 }

@@ -1,6 +1,7 @@
 //! The named paths: pure functions of a field, a name and a number of frames. A frame stands for 1/60 s, so two runs
 //! see the same views whatever the machine; a path is flown whole, however many frames it is cut into.
 
+mod cave;
 mod ground;
 mod peers;
 mod shapes;
@@ -56,6 +57,7 @@ pub const PATHS: &[Path] = &[
     Path { name: "dive", about: "from far above down to eye height", poses: shapes::dive },
     Path { name: "hover", about: "back and forth, so that every distance around crosses a switching threshold many times", poses: shapes::hover },
     Path { name: "teleport", about: "somewhere else in every frame, pseudo-random", poses: shapes::teleport },
+    Path { name: "cave", about: "through a cave from end to end, along the widest way", poses: cave::cave },
     Path { name: "fly", about: "the peers' path near the ground", poses: peers::fly },
     Path { name: "high", about: "the peers' path above all land", poses: peers::high },
 ];

@@ -13,7 +13,7 @@ const WIDE: f64 = 90.0;
 const NARROW: f64 = 3.0;
 
 /// 0 at the first frame, 1 at the last.
-fn along(frames: usize) -> impl Iterator<Item = f64> {
+pub(super) fn along(frames: usize) -> impl Iterator<Item = f64> {
     (0..frames).map(move |k| if frames > 1 { k as f64 / (frames - 1) as f64 } else { 0.0 })
 }
 
@@ -27,7 +27,7 @@ fn above(ground: &Ground, at: [f64; 2], clearance: f64) -> DVec3 {
 }
 
 /// Heading and pitch, degrees, of a direction.
-fn angles(direction: DVec3) -> (f64, f64) {
+pub(super) fn angles(direction: DVec3) -> (f64, f64) {
     let level = direction.x.hypot(direction.z);
     (direction.z.atan2(direction.x).to_degrees(), direction.y.atan2(level).to_degrees())
 }

@@ -24,11 +24,11 @@ use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::walk::{Ground, Stream, Worker};
-use super::{MOST_PAGES, MOST_TRIANGLES, WIDENING};
+use super::{ENTRY, MOST_PAGES, MOST_TRIANGLES, join_streams};
 use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::lod::{Settings, Technique};
+use crate::lod::{Settings, Technique, widened};
 use crate::view::{Containment, Lens, View};
 
 /// Sorted strips over a floor and a ceiling.
@@ -46,6 +46,20 @@ pub struct CaveStrips {
     sequence: Sequence,
     limits: Limits,
     nothing: Geometry,
+}
+
+/// Whether a technique with these settings draws caves, or why not.
+///
+/// # Errors
+/// One line that says what is expected.
+pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
+    if technique != ENTRY.name {
+        return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
+    }
+    match settings.word("level") {
+        "certified" => Ok(()),
+        level => Err(format!("a ceiling: expected level=certified, found level={level}")),
+    }
 }
 
 /// What a row is made with.
@@ -124,15 +138,16 @@ impl CaveStrips {
     }
 
     fn fill(&self, rows: usize, list: &mut DrawList) {
-        for (batch, Stream { vertices, indices }) in (0u32..).zip(self.rows[..rows].iter().map(|row| &row.pairs.stream))
-        {
-            let (base, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
-            list.streamed.vertices.extend_from_slice(vertices);
-            list.streamed.indices.extend(indices.iter().map(|k| base + k));
+        let streams: Vec<&Stream> = self.rows[..rows].iter().map(|row| &row.pairs.stream).collect();
+        join_streams(&streams, &mut list.streamed);
+        let [mut first, mut first_vertex] = [0; 2];
+        for (batch, stream) in (0u32..).zip(&streams) {
             list.instances.push(Instance { batch, ..Instance::default() });
             let (source, topology) = (Source::Streamed, Topology::Triangles);
-            let (indices, instances) = (first..list.streamed.indices.len() as u32, batch..batch + 1);
-            list.draws.push(Draw { source, topology, indices, instances, first_vertex: 0 });
+            let (indices, instances) = (first..first + stream.indices.len() as u32, batch..batch + 1);
+            first = indices.end;
+            list.draws.push(Draw { source, topology, indices, instances, first_vertex });
+            first_vertex += stream.vertices.len() as u32;
         }
         self.sequence.arrange(list);
     }
@@ -152,11 +167,8 @@ impl Technique for CaveStrips {
         let gaze = Gaze::new(self.cave.floor(), view);
         let rows = self.pages.rows(&gaze);
         self.rows.resize_with(rows.len().max(self.rows.len()), RowWorker::default);
-        let mut wider = *view;
-        while !(self.split(&wider) && self.walk(&wider, &gaze, &rows)) {
-            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
-            list.widening *= WIDENING;
-        }
+        let fits = |wider: &View| (self.split(wider) && self.walk(wider, &gaze, &rows)).then_some(());
+        list.widening = widened(view, fits).1;
         self.fill(rows.len(), list);
     }
 

@@ -51,6 +51,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
+use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
 use self::join::join;
@@ -60,10 +61,11 @@ use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::Radial;
-use self::walk::{Ground, Worker};
-use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use self::walk::{Ground, Stream, Worker};
+use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
+use crate::height::cave::Cave;
 use crate::view::{Containment, View};
 
 /// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
@@ -73,8 +75,6 @@ const MOST_TRIANGLES: usize = 1 << 21;
 const MOST_PAGES: u64 = 1 << 16;
 /// Triangles of the frame before from which on rows are walked on all cores: for fewer it takes longer to share them out.
 const LEAST_PARALLEL: usize = 20_000;
-/// What the tolerance is multiplied by until a frame fits.
-const WIDENING: f64 = 1.5;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -122,7 +122,10 @@ pub const ENTRY: Entry = Entry {
     ],
     most_samples: u64::MAX,
     takes_endless: false,
-    build: |field, settings| Box::new(SortedStrips::new(field, settings)),
+    build: |field, settings| match Cave::of(&field) {
+        Some(cave) => Box::new(CaveStrips::new(Arc::new(cave), settings)),
+        None => Box::new(SortedStrips::new(field, settings)),
+    },
 };
 
 struct SortedStrips {
@@ -245,9 +248,8 @@ impl SortedStrips {
             std::mem::swap(&mut streamed.vertices, &mut worker.stream.vertices);
             std::mem::swap(&mut streamed.indices, &mut worker.stream.indices);
         } else {
-            let streams = || workers[..lengths.len()].iter().map(|worker| &worker.stream);
-            join(&streams().map(|stream| stream.vertices.as_slice()).collect::<Vec<_>>(), &mut streamed.vertices);
-            join(&streams().map(|stream| stream.indices.as_slice()).collect::<Vec<_>>(), &mut streamed.indices);
+            let streams: Vec<&Stream> = workers[..lengths.len()].iter().map(|worker| &worker.stream).collect();
+            join_streams(&streams, streamed);
         }
         let [mut first_vertex, mut first] = [0; 2];
         for (batch, [vertices, indices]) in (0u32..).zip(lengths.iter().map(|own| own.map(|n| n as u32))) {
@@ -260,6 +262,12 @@ impl SortedStrips {
         }
         self.sequence.arrange(list);
     }
+}
+
+/// All streams, one after the other; indices count from the first vertex of their own.
+fn join_streams(streams: &[&Stream], into: &mut Geometry) {
+    join(&streams.iter().map(|stream| stream.vertices.as_slice()).collect::<Vec<_>>(), &mut into.vertices);
+    join(&streams.iter().map(|stream| stream.indices.as_slice()).collect::<Vec<_>>(), &mut into.indices);
 }
 
 impl Technique for SortedStrips {
@@ -279,18 +287,11 @@ impl Technique for SortedStrips {
         workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
         let is_serial = self.is_serial || self.triangles_before < LEAST_PARALLEL;
         let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
-        let mut wider = *view;
-        let lengths = loop {
-            if let Some(lengths) = self.strips(&wider, &gaze, &rows, of_frame) {
-                break lengths;
-            }
-            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
-        };
+        let (lengths, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, of_frame));
         self.fill(&lengths, of_frame, list);
         self.workers = workers;
         self.triangles_before = list.streamed.indices.len() / 3;
-        list.widening =
-            if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px };
+        list.widening = widening;
     }
 
     fn keeps_tolerance(&self) -> bool {

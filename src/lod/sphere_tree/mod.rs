@@ -44,7 +44,7 @@ use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
 use self::shells::Shells;
 use self::splits::{Found, Splits};
-use super::{Entry, Setting, Settings, Technique, Values};
+use super::{Entry, Setting, Settings, Technique, Values, widened};
 use crate::draw::{DrawList, Geometry, Limits, Manner, Normals};
 use crate::height::Field;
 use crate::view::View;
@@ -57,8 +57,6 @@ const HOLD: f64 = 1.1;
 const MOST_SPLITS: usize = 1 << 20;
 /// The same of a land without end, whose diamonds are worked out as they are met.
 const MOST_OPEN_SPLITS: usize = 1 << 17;
-/// What the tolerance is multiplied by until a frame fits.
-const WIDENING: f64 = 1.5;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -180,18 +178,12 @@ impl Technique for SphereTree {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        let mut wider = *view;
-        let from = loop {
-            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&wider));
+        let (from, widening) = widened(view, |wider| {
+            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(wider));
             let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
-            if self.criterion.follow(&self.measured, &from, most_splits(&self.measured)) {
-                break from;
-            }
-            wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
-        };
-        if wider.tolerance.px != view.tolerance.px {
-            list.widening = wider.tolerance.px / view.tolerance.px;
-        }
+            self.criterion.follow(&self.measured, &from, most_splits(&self.measured)).then_some(from)
+        });
+        list.widening = widening;
         self.blocks.look(view);
         let Self { measured, blocks, criterion, .. } = self;
         let mesh = Mesh { measured, splits: criterion.splits(), blocks, from: &from };

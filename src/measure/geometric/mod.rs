@@ -53,7 +53,7 @@ pub struct Errors {
     pub screen_at: Option<Place>,
 }
 
-/// Measures the triangles of a list. Time is linear in triangles and samples; memory is bounded by a
+/// Measures the triangles of a list; in a cave those that face down against its ceiling. Time is linear in triangles and samples; memory is bounded by a
 /// few thousandths of the field's samples for each of 64 pieces of work.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
     let ruler = Ruler::new(field, view);
@@ -97,31 +97,48 @@ impl Tallies {
 /// What triangles are measured with.
 struct Ruler<'a> {
     field: &'a Field,
+    /// What triangles that face up are held against.
+    floor: Truth<'a>,
+    /// What those that face down are, in a cave.
+    ceiling: Option<Truth<'a>>,
     tolerance_px: f64,
     frame: Frame,
     frustum: Frustum,
     projection: Projection,
-    silhouette: Silhouette<'a>,
     /// Squared cosines of the angles where bins meet.
     bin_ends: [f64; ANGLES - 1],
+}
+
+/// The surface that should be there.
+struct Truth<'a> {
+    field: &'a Field,
+    silhouette: Silhouette<'a>,
+}
+
+impl<'a> Truth<'a> {
+    fn new(field: &'a Field, view: &View) -> Self {
+        Self { field, silhouette: Silhouette::new(field, view) }
+    }
 }
 
 impl<'a> Ruler<'a> {
     fn new(field: &'a Field, view: &View) -> Self {
         Self {
             field,
+            floor: Truth::new(field, view),
+            ceiling: field.ceiling().map(|ceiling| Truth::new(ceiling, view)),
             tolerance_px: view.tolerance.px,
             frame: Frame::placing(field, view),
             frustum: view.frustum(),
             projection: Projection::new(view),
-            silhouette: Silhouette::new(field, view),
             bin_ends: std::array::from_fn(|k| (10.0 * (k + 1) as f64).to_radians().cos().powi(2)),
         }
     }
 
     fn tallies(&self) -> Tallies {
         let [w, h] = self.field.size().map(u64::from);
-        let tally = || Tally::new(w * h, 1000);
+        let surfaces = 1 + u64::from(self.ceiling.is_some());
+        let tally = || Tally::new(surfaces * w * h, 1000);
         Tallies {
             vertical: tally(),
             screen: tally(),
@@ -134,25 +151,30 @@ impl<'a> Ruler<'a> {
     fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Tallies {
         let mut tallies = self.tallies();
         expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle: &Drawn| {
-            self.triangle(&facing_up(&triangle.corners), &mut tallies);
+            let truth = self.ceiling.as_ref().filter(|_| doubled_area(&triangle.corners) < 0).unwrap_or(&self.floor);
+            self.triangle(truth, &facing_up(&triangle.corners), &mut tallies);
         });
         tallies
     }
 
-    fn triangle(&self, triangle: &Triangle, tallies: &mut Tallies) {
+    fn triangle(&self, truth: &Truth, triangle: &Triangle, tallies: &mut Tallies) {
         if self.frustum.contains(&bounds(self.field, triangle)) == Containment::Outside {
             return;
         }
         let last = self.field.size().map(|n| n as i32 - 1);
         surface::visit_samples(triangle, |x, z, y| {
-            let error = y - f64::from(self.field.height(x, z));
+            let error = y - f64::from(truth.field.height(x, z));
             let counts = owns(triangle, [x as i32, z as i32], last);
             if (error == 0.0 && !counts) || self.field.is_hole(x, z) {
                 return;
             }
             let drawn = self.field.world_at(f64::from(x), f64::from(z), y);
             if let Some(at) = self.projection.project_seen(drawn) {
-                self.sample(Place { sample: [x, z], truth: self.field.world(x, z), drawn }, &at, counts, tallies);
+                let place = Place { sample: [x, z], truth: truth.field.world(x, z), drawn };
+                self.sample(place, &at, counts, tallies);
+                if truth.silhouette.passes(&place) {
+                    tallies.silhouette.add(self.projection.distance_px(&at, place.truth), counts, place);
+                }
             }
         });
     }
@@ -163,9 +185,6 @@ impl<'a> Ruler<'a> {
         tallies.screen.add(error_px, counts, place);
         tallies.off_axis[self.angle_bin(place.drawn, at)].add(error_px, counts, place);
         tallies.beyond += u64::from(counts && error_px > self.tolerance_px);
-        if self.silhouette.passes(&place) {
-            tallies.silhouette.add(error_px, counts, place);
-        }
     }
 
     fn angle_bin(&self, point: DVec3, at: &Projected) -> usize {

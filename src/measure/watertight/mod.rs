@@ -84,7 +84,7 @@ impl std::error::Error for CounterExample {}
 pub struct Proof {
     /// Triangles.
     pub triangles: usize,
-    /// Twice the land covered, in samples².
+    /// Twice the land covered, in samples²; that of a cave by its floor.
     pub doubled_area: i64,
     /// Edges with a triangle on one side only; with skirts, their parts from sample to sample.
     pub border_edges: usize,
@@ -142,6 +142,11 @@ pub fn prove_list(
 ) -> Result<Proof, Box<CounterExample>> {
     let (frame, frustum) = (Frame::placing(field, view), view.frustum());
     let triangles = expand::triangles(field, &frame, resident, list);
+    if field.ceiling().is_some() {
+        let cave::CaveProof { pairs, doubled_area, seam_edges, open_edges } =
+            cave::prove_cave(field, &frustum, &triangles)?;
+        return Ok(Proof { triangles: 2 * pairs, doubled_area, border_edges: seam_edges + open_edges });
+    }
     match seams {
         Seams::Shared => prove(field, &frustum, &triangles),
         Seams::Skirts => {

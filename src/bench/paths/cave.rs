@@ -1,0 +1,159 @@
+//! A flight through a cave from end to end, along the widest way. Over land without a ceiling it is one at eye height.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use super::ground::Ground;
+use super::shapes::{along, angles};
+use super::{Opening, Pose};
+
+/// About so many places along a side are looked at.
+const PLACES: u32 = 512;
+/// The way goes where there is this part of the most room, at least.
+const LEAST_ROOM: f64 = 0.3;
+/// Corners of the way are means of so many places before and behind.
+const SMOOTHED: usize = 6;
+/// How far ahead the eye looks, as a part of the way.
+const AHEAD: f64 = 0.02;
+/// Where the eye is between floor and ceiling.
+const MIDDLE: f64 = 0.5;
+/// How near it may come to either.
+const NEAREST: f64 = 0.25;
+
+/// See [`PATHS`](super::PATHS).
+pub fn cave(ground: &Ground, frames: usize) -> Vec<Pose> {
+    let way = Way::through(ground);
+    let pose = |t: f64| {
+        let eye = way.eye(ground, t);
+        let from = t.min(1.0 - AHEAD);
+        let (yaw, pitch) = angles(way.smooth(from + AHEAD) - way.smooth(from));
+        Pose { eye, yaw, pitch: pitch.clamp(-30.0, 30.0), opening: Opening::Horizontal(75.0) }
+    };
+    along(frames).map(pose).collect()
+}
+
+/// World positions half-way between floor and ceiling.
+struct Way {
+    places: Vec<DVec3>,
+}
+
+impl Way {
+    fn through(ground: &Ground) -> Self {
+        let rooms = Rooms::of(ground);
+        let widest = (0..rooms.heights.len()).max_by(|&a, &b| rooms.heights[a].total_cmp(&rooms.heights[b]));
+        let one_end = rooms.furthest(widest.unwrap_or(0)).0;
+        let (other_end, before) = rooms.furthest(one_end);
+        let mut cells = vec![other_end];
+        while let Some(&next) = cells.last().filter(|&&cell| cell != one_end) {
+            cells.push(before[next]);
+        }
+        let places: Vec<DVec3> = cells.iter().map(|&cell| rooms.middle(ground, cell)).collect();
+        let mean = |k: usize| {
+            let around = &places[k.saturating_sub(SMOOTHED)..(k + SMOOTHED + 1).min(places.len())];
+            around.iter().sum::<DVec3>() / around.len() as f64
+        };
+        Self { places: (0..places.len()).map(mean).collect() }
+    }
+
+    /// The place at a part of the way.
+    fn smooth(&self, t: f64) -> DVec3 {
+        let at = t * (self.places.len() - 1) as f64;
+        let next = (at as usize + 1).min(self.places.len() - 1);
+        self.places[at as usize].lerp(self.places[next], at.fract())
+    }
+
+    /// The same between floor and ceiling.
+    fn eye(&self, ground: &Ground, t: f64) -> DVec3 {
+        let (low, high, mean) = (ground.place(0.0, 0.0), ground.place(1.0, 1.0), self.smooth(t));
+        // Means of places at the rim are rounded.
+        let place = DVec3 { x: mean.x.clamp(low[0], high[0]), z: mean.z.clamp(low[1], high[1]), ..mean };
+        let (floor, room) = (ground.height([place.x, place.z]), ground.room([place.x, place.z]));
+        DVec3 { y: place.y.clamp(floor + NEAREST * room, floor + (1.0 - NEAREST) * room), ..place }
+    }
+}
+
+/// Room between floor and ceiling at places in rows.
+struct Rooms {
+    /// Places along (x, z).
+    count: [usize; 2],
+    /// By place, metres.
+    heights: Vec<f64>,
+    most: f64,
+}
+
+impl Rooms {
+    fn of(ground: &Ground) -> Self {
+        let count = ground.field.size().map(|n| n.min(PLACES) as usize);
+        let mut rooms = Self { count, heights: Vec::new(), most: 0.0 };
+        rooms.heights = (0..count[0] * count[1]).map(|cell| ground.room(rooms.place(ground, cell))).collect();
+        rooms.most = rooms.heights.iter().copied().fold(0.0, f64::max);
+        rooms
+    }
+
+    /// World position (x, z).
+    fn place(&self, ground: &Ground, cell: usize) -> [f64; 2] {
+        let part = |n: usize, count: usize| n as f64 / (count - 1) as f64;
+        ground.place(part(cell % self.count[0], self.count[0]), part(cell / self.count[0], self.count[1]))
+    }
+
+    fn middle(&self, ground: &Ground, cell: usize) -> DVec3 {
+        let [x, z] = self.place(ground, cell);
+        DVec3::new(x, ground.height([x, z]) + MIDDLE * self.heights[cell], z)
+    }
+
+    /// The place with the longest of all shortest ways from here, narrow ones being longer; and by place the one before
+    /// it on that way.
+    fn furthest(&self, from: usize) -> (usize, Vec<usize>) {
+        let mut before = vec![usize::MAX; self.heights.len()];
+        let (mut reached, mut last) = (BinaryHeap::from([Reverse((0, from, from))]), from);
+        while let Some(Reverse((length, cell, came_from))) = reached.pop() {
+            if before[cell] != usize::MAX {
+                continue;
+            }
+            (before[cell], last) = (came_from, cell);
+            for next in self.beside(cell).filter(|&next| before[next] == usize::MAX) {
+                let wide = self.heights[next] / self.most;
+                if wide >= LEAST_ROOM {
+                    reached.push(Reverse((length + (100.0 / (wide * wide)) as u64, next, cell)));
+                }
+            }
+        }
+        (last, before)
+    }
+
+    fn beside(&self, cell: usize) -> impl Iterator<Item = usize> {
+        let ([w, h], [x, z]) = (self.count, [cell % self.count[0], cell / self.count[0]]);
+        let west = (x > 0).then(|| cell - 1);
+        let east = (x + 1 < w).then(|| cell + 1);
+        let north = (z > 0).then(|| cell - w);
+        let south = (z + 1 < h).then(|| cell + w);
+        [west, east, north, south].into_iter().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::cave::Cave;
+    use crate::height::synth::{Kind, synth};
+
+    /// Through the synthetic cave, never in the rock, and a long way.
+    #[test]
+    fn the_eye_is_between_floor_and_ceiling() {
+        for seed in [1, 7] {
+            let [floor, ceiling] = [Kind::CaveFloor, Kind::CaveCeiling].map(|kind| synth(kind, [257, 257], seed));
+            let cave = Cave::new(&floor, &ceiling, "ceiling").expect("two fields of one size");
+            let ground = Ground::of(cave.floor());
+            let poses = super::cave(&ground, 200);
+            for pose in &poses {
+                let at = [pose.eye.x, pose.eye.z];
+                let (low, room) = (ground.height(at), ground.room(at));
+                assert!(room > 1.0 && pose.eye.y > low + 0.2 * room && pose.eye.y < low + 0.8 * room, "{pose:?}");
+            }
+            let length: f64 = poses.windows(2).map(|p| p[0].eye.distance(p[1].eye)).sum();
+            assert!(length > 300.0, "seed {seed}: {length} m");
+        }
+    }
+}

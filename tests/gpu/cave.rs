@@ -1,0 +1,156 @@
+//! A floor and a ceiling on the device.
+
+use std::sync::Arc;
+
+use cuesta::bench::paths;
+use cuesta::draw::expand::{self, Drawn};
+use cuesta::draw::layout::Frame;
+use cuesta::gpu::Gpu;
+use cuesta::height::Field;
+use cuesta::height::cave::Cave;
+use cuesta::height::synth::{Kind, synth};
+use cuesta::lod::Technique;
+use cuesta::measure::geometric;
+use cuesta::plan::{Colour, Look, ScenePlan};
+use cuesta::scene::holes::Truth;
+use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+
+use super::{difference, on_device, technique};
+
+/// The floor of a cave, which stands for it.
+fn cave() -> Arc<Field> {
+    let [floor, ceiling] = [Kind::CaveFloor, Kind::CaveCeiling].map(|kind| synth(kind, [257, 193], 7));
+    Arc::clone(Cave::new(&floor, &ceiling, "ceiling").expect("two fields of one size").floor())
+}
+
+/// Views along the flight through it.
+fn flight(field: &Field, frames: usize, px: f64) -> Vec<View> {
+    let tolerance = Tolerance { px, metric: Metric::Certified };
+    paths::find("cave").expect("a named path").views(field, frames, [240, 160], tolerance)
+}
+
+fn plan(gpu: &Gpu, field: &Field, look: &Look) -> ScenePlan {
+    ScenePlan::new(field, look, &gpu.device_limits()).unwrap()
+}
+
+fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Technique, view: &View) -> Stage {
+    let plan = plan(gpu, field, look);
+    Scene { gpu, field, plan: &plan, look, overlay: None }.stage(technique, view.size).unwrap()
+}
+
+/// The share of a picture's pixels of which that is true.
+fn share(picture: &image::RgbaImage, of: impl Fn([u8; 4]) -> bool) -> f64 {
+    picture.pixels().filter(|pixel| of(pixel.0)).count() as f64 / picture.pixels().len() as f64
+}
+
+#[test]
+fn the_device_draws_the_floor_and_the_ceiling_that_the_host_expands() {
+    on_device(|gpu| {
+        let field = cave();
+        let mut technique = technique(&field, "sorted-strips", &[]);
+        for view in flight(&field, 4, 1.5) {
+            let mut stage = stage(gpu, &field, &Look::default(), technique.as_ref(), &view);
+            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let [captured, skirts] = stage.capture(technique.as_ref(), &view).unwrap();
+            let captured: Vec<Drawn> = captured.iter().map(|t| t.drawn).collect();
+            let frame = Frame::placing(&field, &view);
+            assert_eq!(captured, expand::triangles(&field, &frame, technique.resident(), &stage.list));
+            assert!(captured.len() > 500 && skirts.is_empty(), "{} triangles", captured.len());
+            let [there_m, there_px] = stage.errors(technique.as_ref(), &view).unwrap();
+            let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
+            for (there, here) in [(there_m, here.vertical_m), (there_px, here.screen_px)] {
+                let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
+                assert!(here.count > 1000 && near(there.count as f64, here.count as f64, 2e-3), "{there:?} {here:?}");
+                assert!(near(there.max, here.max, 1e-4) && near(there.rms, here.rms, 1e-3), "{there:?} {here:?}");
+            }
+            assert!(here.screen_px.max <= 1.5, "{here:?}");
+        }
+    });
+}
+
+#[test]
+fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
+    on_device(|gpu| {
+        let (field, look) = (cave(), Look::default());
+        let mut technique = technique(&field, "sorted-strips", &[]);
+        let plan = plan(gpu, &field, &look);
+        let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+        for (k, view) in flight(&field, 8, 1.0).iter().enumerate() {
+            let shot = scene.shoot(technique.as_mut(), view, 1).unwrap();
+            let truth = Truth::new(&scene, view).unwrap();
+            assert_eq!(truth.hole_pixels(view, &shot.picture), [0; 0], "frame {k}");
+            // The way ends at the field's rim, where the cave is open.
+            let closed = share(&shot.picture, |[_, _, _, a]| a > 0);
+            println!("frame {k}: {closed:.3} of the pixels are rock; eye {:?}, forward {:?}", view.eye, view.forward());
+            assert!(closed > if (2..6).contains(&k) { 0.9 } else { 0.3 }, "frame {k}: {closed} of the pixels are rock");
+            let (_, apart) = difference(&shot.picture, &truth.picture, 24);
+            assert!(apart < 0.05, "frame {k}: {apart} of the pixels are not those of all samples");
+        }
+    });
+}
+
+/// Straight up is the ceiling, whose normals point down and whose samples are the ceiling's; straight down the floor.
+#[test]
+fn faces_are_lit_as_what_they_are() {
+    on_device(|gpu| {
+        let field = cave();
+        let mut technique = technique(&field, "sorted-strips", &[]);
+        for view in &flight(&field, 5, 1e-3)[1..4] {
+            for (pitch, points_down) in [(90.0, true), (-90.0, false)] {
+                let lens = Lens::Perspective { fov_x: 0.4 };
+                let view = View { world_from_eye: View::turned(0.0, pitch, 0.0), lens, ..*view };
+                let mut picture = |colour| {
+                    let look = Look { colour, ..Look::default() };
+                    let mut stage = stage(gpu, &field, &look, technique.as_ref(), &view);
+                    stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+                    stage.picture()
+                };
+                // A normal's y from −1 to 1 is half of the light or less, or more.
+                let normals = picture(Colour::Normal);
+                let down = share(&normals, |[_, g, _, a]| a > 0 && g < 188);
+                assert!(if points_down { down > 0.95 } else { down < 0.05 }, "{down} of the normals point down");
+                let errors = picture(Colour::Error);
+                let exact = share(&errors, |[r, _, b, a]| a > 0 && b > r);
+                if exact < 0.95 {
+                    errors.save("/tmp/cv8/bad.png").unwrap();
+                }
+                assert!(exact > 0.95, "{exact} of the pixels are where the samples are: {pitch} {:?}", view.eye);
+            }
+        }
+    });
+}
+
+#[test]
+fn the_floor_of_the_time_is_lit_alike() {
+    on_device(|gpu| {
+        let field = cave();
+        let mut technique = technique(&field, "sorted-strips", &[]);
+        for view in flight(&field, 3, 0.5) {
+            let mut stage = stage(gpu, &field, &Look::default(), technique.as_ref(), &view);
+            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let drawn = stage.picture();
+            stage.draw_floor(&view, Copy::Picture).unwrap();
+            let (largest, share) = difference(&drawn, &stage.picture(), 6);
+            assert!(share < 0.01, "{largest} at worst, {share} of the pixels differ");
+        }
+    });
+}
+
+/// What is no cave has no ceiling on the device.
+#[test]
+fn a_ceiling_is_there_only_where_it_is_needed() {
+    on_device(|gpu| {
+        let cave = cave();
+        let bytes = |field: &Arc<Field>| {
+            let technique = technique(field, "sorted-strips", &[]);
+            let view = flight(field, 1, 1.0)[0];
+            let _stage = stage(gpu, field, &Look::default(), technique.as_ref(), &view);
+            gpu.device_bytes().get("ceiling").copied().unwrap_or(0)
+        };
+        assert!(bytes(&cave) >= 4 * 257 * 193);
+        let alone = Arc::new(synth(Kind::CaveFloor, [257, 193], 7));
+        assert_eq!(bytes(&alone), 0);
+        assert!(!plan(gpu, &alone, &Look::default()).ceiling);
+    });
+}
