@@ -50,6 +50,9 @@ pub struct Common {
     /// Validation layers on; any message makes the exit code 1.
     #[arg(long, global = true)]
     pub validate: bool,
+    /// Device memory is out after so many allocations: to try what happens then.
+    #[arg(long, global = true, value_name = "N")]
+    pub allocations: Option<u64>,
 }
 
 /// The subcommands.

@@ -108,7 +108,9 @@ impl From<Summary> for Statistics {
 
 /// The device that the command line asks for.
 pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
-    Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)
+    let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)?;
+    gpu.limit_allocations(common.allocations.unwrap_or(u64::MAX));
+    Ok(gpu)
 }
 
 /// The choice of device on the command line.

@@ -2,6 +2,7 @@
 
 use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use anyhow::{Context, Result, bail};
@@ -75,6 +76,8 @@ pub struct Gpu {
     pub(super) timestamp_bits: u32,
     /// Device bytes in use by purpose.
     pub(super) bytes: Mutex<std::collections::BTreeMap<&'static str, u64>>,
+    /// Allocations that are still to succeed.
+    allocations_left: AtomicU64,
 }
 
 /// All devices of an instance, the usable ones first, the best first among them.
@@ -255,6 +258,7 @@ impl Gpu {
             clock,
             timestamp_bits,
             bytes: Mutex::default(),
+            allocations_left: AtomicU64::new(u64::MAX),
         });
         gpu.name(queue, "queue");
         Ok(gpu)
@@ -298,6 +302,16 @@ impl Gpu {
             image_layers: self.limits.max_image_array_layers,
             filters_heights: filters(vk::Format::R16_UNORM) && filters(vk::Format::R32_SFLOAT),
         }
+    }
+
+    /// From now on so many allocations of device memory succeed, and those after them fail: to try what happens then.
+    pub fn limit_allocations(&self, count: u64) {
+        self.allocations_left.store(count, Relaxed);
+    }
+
+    /// Counts an allocation: whether it may succeed.
+    pub(super) fn may_allocate(&self) -> bool {
+        self.allocations_left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok()
     }
 
     /// Device bytes in use, by purpose.

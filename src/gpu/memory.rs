@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
@@ -68,10 +68,10 @@ impl Memory {
             linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
+        let out_of_memory = || format!("out of memory: {} bytes for {purpose}", requirements.size);
+        ensure!(gpu.may_allocate(), "{}, as asked for", out_of_memory());
         let mut allocator = gpu.allocator.lock().unwrap_or_else(|e| e.into_inner());
-        let allocation = allocator
-            .allocate(&description)
-            .with_context(|| format!("out of memory: {} bytes for {purpose}", requirements.size))?;
+        let allocation = allocator.allocate(&description).with_context(out_of_memory)?;
         drop(allocator);
         *gpu.bytes.lock().unwrap_or_else(|e| e.into_inner()).entry(purpose).or_default() += requirements.size;
         Ok(Self { gpu: Arc::clone(gpu), allocation: Some(allocation), purpose, size: requirements.size })

@@ -9,6 +9,7 @@ mod driven;
 mod endless;
 mod golden;
 mod layout;
+mod memory;
 mod neck;
 mod painter;
 mod plan;
