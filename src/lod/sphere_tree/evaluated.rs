@@ -88,7 +88,7 @@ impl Evaluated {
         let bounds = self.land.bounds(&Area::about(place, reach * half_m), longest_m);
         let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
         let rounding_m = bounds.height_m[0].abs().max(bounds.height_m[1].abs()) * self.rounding;
-        let ball = (steps_m + bounds.way_m) * f64::from(1.0 + SPARE);
+        let ball = (steps_m + bounds.way_m) * (1.0 + SPARE);
         Size {
             height: self.land.height(place),
             error: ((bounds.deviation_m + rounding_m) as f32).next_up(),
