@@ -221,5 +221,5 @@ fn on_one_core_the_list_is_the_same() {
         }
     }
     println!("{rows} rows of pages, {parallel_rows} of them walked side by side");
-    assert!(parallel_rows > 200 && rows > 2 * parallel_rows, "{rows} rows of pages, {parallel_rows} side by side");
+    assert!(parallel_rows >= 100 && rows > 2 * parallel_rows, "{rows} rows of pages, {parallel_rows} side by side");
 }

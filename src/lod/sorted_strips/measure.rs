@@ -12,6 +12,9 @@ use crate::height::bounds::{KEPT_FROM, Square};
 use crate::height::kept::Kept;
 use crate::height::surface::{self, Corner};
 
+/// Samples of a tiled field of which no two squares lie in their tiles alike, and that are measured all the same.
+const MOST_SAMPLES: u64 = 1 << 22;
+
 /// All squares of a field up to a level.
 pub struct Errors {
     last: [i32; 2],
@@ -140,13 +143,20 @@ impl Errors {
         self.levels.last().into_iter().flat_map(|level| &level.squares).fold(Square::NOTHING, |a, b| a.union(*b)).range
     }
 
-    /// Squares held of a level along (x, z); `None` if they may lie anywhere: a tiled axis is held once if its squares,
-    /// and the pairs of them, lie alike in every tile.
+    /// Squares held of a level along (x, z); `None` if they are too many to measure: a tiled axis is held as far as its
+    /// squares, and the pairs of them, lie in their tile as none before did, or to the field's end.
     fn count(&self, field: &Field, level: u32) -> Option<[u32; 2]> {
         let stored = field.stored();
-        let repeats = |k: usize| !self.is_tiled[k] || stored[k].is_multiple_of(2 << level);
-        let length = |k: usize| if self.is_tiled[k] { stored[k] } else { stored[k] - 1 };
-        (repeats(0) && repeats(1)).then(|| [0, 1].map(|k| length(k).div_ceil(1 << level)))
+        let length = |k: usize| {
+            let (side, stored, last) = (2u64 << level, u64::from(stored[k]), self.last[k] as u64);
+            // Sides are powers of two: what they and the tile have in common are the tile's trailing zeros.
+            let repeats_after = stored * (side >> stored.trailing_zeros().min(level + 1));
+            if self.is_tiled[k] { repeats_after.min(last) } else { last }
+        };
+        let lengths = [length(0), length(1)];
+        let tile = stored.iter().map(|&n| u64::from(n)).product::<u64>();
+        let fits = lengths[0] * lengths[1] <= tile.max(MOST_SAMPLES);
+        fits.then(|| lengths.map(|length| length.div_ceil(1 << level) as u32))
     }
 
     fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
@@ -303,23 +313,35 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_tiled_field_is_measured_once_and_for_all_tiles() {
-        let size = [64u32, 32];
+    /// A tiled field is known as well as one that holds all of its tiles, in `share` of its bytes at most.
+    fn as_if_held(size: [u32; 2], tiles: [u32; 2], share: usize) {
         let heights = (0..size[0] * size[1]).map(|k| ((k * 7919) % 1009) as f32).collect::<Vec<_>>();
-        let field = Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none(0)).tiled([3, 2]);
+        let field = Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none(0)).tiled(tiles);
         let [w, h] = field.size();
         let held = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
         let held = Field::new(Samples::F32(held), [w, h], [1.0; 2], Holes::none(0));
         let (tiled, whole) = (Errors::new(&field, 4), Errors::new(&held, 4));
-        assert!(tiled.bytes() < whole.bytes() / 3);
+        assert!(tiled.bytes() <= whole.bytes() / share);
         for level in 1..=4 {
-            for (x, z) in (0..192 >> level).flat_map(|x| (0..64 >> level).map(move |z| (x, z))) {
+            for (x, z) in (0..w as i32 >> level).flat_map(|x| (0..h as i32 >> level).map(move |z| (x, z))) {
                 let (of_tiled, exact) = (tiled.square(level, [x, z]), whole.square(level, [x, z]));
                 assert!(of_tiled.error >= exact.error && of_tiled.range[0] <= exact.range[0]);
-                let is_inside = (x / 2 + 1) << (level + 1) < 192 && (z / 2 + 1) << (level + 1) < 64;
+                let is_inside = (x / 2 + 1) << (level + 1) < w as i32 && (z / 2 + 1) << (level + 1) < h as i32;
                 assert!(!is_inside || of_tiled == exact, "level {level} at ({x}, {z})");
             }
+        }
+    }
+
+    #[test]
+    fn a_tiled_field_is_measured_once_and_for_all_tiles() {
+        as_if_held([64, 32], [3, 2], 3);
+    }
+
+    /// Squares that lie in every tile in another way are measured in each.
+    #[test]
+    fn tiles_of_any_period_are_measured_to_the_bit() {
+        for (size, tiles) in [([41, 30], [4, 5]), ([64, 24], [3, 6]), ([3, 2], [20, 31]), ([17, 32], [40, 3])] {
+            as_if_held(size, tiles, 1);
         }
     }
 }
