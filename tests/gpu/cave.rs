@@ -96,7 +96,8 @@ fn faces_are_lit_as_what_they_are() {
     on_device(|gpu| {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
-        for view in &flight(&field, 5, 1e-3)[1..4] {
+        // Along the axis of the view a large error is no displacement: next to no tolerance leaves none of either.
+        for view in &flight(&field, 5, 1e-9)[1..4] {
             for (pitch, points_down) in [(90.0, true), (-90.0, false)] {
                 let lens = Lens::Perspective { fov_x: 0.4 };
                 let view = View { world_from_eye: View::turned(0.0, pitch, 0.0), lens, ..*view };
@@ -112,9 +113,6 @@ fn faces_are_lit_as_what_they_are() {
                 assert!(if points_down { down > 0.95 } else { down < 0.05 }, "{down} of the normals point down");
                 let errors = picture(Colour::Error);
                 let exact = share(&errors, |[r, _, b, a]| a > 0 && b > r);
-                if exact < 0.95 {
-                    errors.save("/tmp/cv8/bad.png").unwrap();
-                }
                 assert!(exact > 0.95, "{exact} of the pixels are where the samples are: {pitch} {:?}", view.eye);
             }
         }
