@@ -28,7 +28,7 @@ fn two_of_a_kind(form: &Form) -> Vec<Finding> {
         });
         lists[0] != lists[1]
     });
-    let broken = differs.map(|view| Broken { view, why: "two techniques made alike draw two lists".to_string() });
+    let broken = differs.map(|view| Broken::new(view, "two techniques made alike draw two lists"));
     vec![Finding::holds("same frame twice, same bytes", broken.map_or(Ok(()), Err))]
 }
 
@@ -60,7 +60,7 @@ fn fine_steps(form: &Form) -> Vec<Finding> {
         let more = list.triangles().saturating_sub(before) as f64;
         if more > worst.0 {
             let why = format!("{} triangles at {px} px, {before} at 1 % less", list.triangles());
-            worst = (more, Some(Broken { view: (named.0, view), why }));
+            worst = (more, Some(Broken::new((named.0, view), why)));
         }
         before = list.triangles();
     }

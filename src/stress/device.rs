@@ -86,14 +86,14 @@ impl DeviceEye {
         seen: &mut Seen,
     ) -> Result<()> {
         let view = &named.1;
-        let broken = |why: &str| Err(Broken { view: named, why: why.to_string() });
+        let broken = |why: &str| Err(Broken::new(named, why));
         stage.draw(technique, view, Copy::PictureAndDepth)?;
         stage.complete()?;
         let picture = stage.picture();
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
         let holes = Truth::new(&self.scene(field, &plan), view)?.hole_pixels(view, &picture).len();
         if holes > 0 && seen.holes_at.is_none() {
-            seen.holes_at = Some(Broken { view: named, why: format!("{holes} pixels of sky where land is") });
+            seen.holes_at = Some(Broken::new(named, format!("{holes} pixels of sky where land is")));
         }
         seen.holes += holes;
         if stage.captures() && !is_as_listed(field, technique, stage, view)? {

@@ -45,7 +45,7 @@ struct Check {
 
 impl Check {
     fn frame(&mut self, field: &Field, technique: &dyn Technique, view: &View, list: &DrawList) {
-        let broken = |why: String| Broken { view: ("a frame", *view), why };
+        let broken = |why: String| Broken::new(("a frame", *view), why);
         let (seams, resident) = (technique.manner().seams, technique.resident());
         let proof = watertight::prove_list(field, view, seams, resident, list);
         let proof = proof.map(|_| ()).map_err(|why| broken(why.to_string()));
@@ -56,7 +56,7 @@ impl Check {
         if technique.keeps_tolerance() && list.waiting == 0 {
             let errors = geometric::errors(field, view, resident, list);
             let share = errors.screen_px.max / view.tolerance.px;
-            if !(share <= self.error) {
+            if share.is_nan() || share > self.error {
                 let why = format!("{} px of {} at {:?}", errors.screen_px.max, view.tolerance.px, errors.screen_at);
                 (self.error, self.worst) = (share, Some(broken(why)));
             }

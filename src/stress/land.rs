@@ -45,13 +45,13 @@ fn in_numbers(subject: &mut Subject) -> Vec<Finding> {
         if subject.technique.keeps_tolerance() {
             let errors = geometric::errors(subject.field, &view, subject.technique.resident(), &list);
             let share = errors.screen_px.max / view.tolerance.px;
-            if !(share <= error) {
+            if share.is_nan() || share > error {
                 let why = format!("{} px of {} at {:?}", errors.screen_px.max, view.tolerance.px, errors.screen_at);
-                (error, at) = (share, Some(Broken { view: named, why }));
+                (error, at) = (share, Some(Broken::new(named, why)));
             }
         }
         let fine = all_numbers(subject.field, subject.technique, &view, &list);
-        numbers = numbers.and(fine.map_err(|why| Broken { view: named, why }));
+        numbers = numbers.and(fine.map_err(|why| Broken::new(named, why)));
     }
     let error = Finding::within("screen error, tolerances", error, 1.0 + SLACK);
     let at = if error.passes() { None } else { at };

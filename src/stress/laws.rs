@@ -34,9 +34,16 @@ pub struct Subject<'a> {
 #[derive(Clone, Debug)]
 pub struct Broken {
     /// The view in which it does, and its name.
-    pub view: (&'static str, View),
+    pub view: Box<(&'static str, View)>,
     /// How.
     pub why: String,
+}
+
+impl Broken {
+    /// In a view.
+    pub fn new(view: (&'static str, View), why: impl Into<String>) -> Self {
+        Self { view: Box::new(view), why: why.into() }
+    }
 }
 
 impl fmt::Display for Broken {
@@ -123,7 +130,7 @@ impl Subject<'_> {
 
     /// Runs a check in every view and names the view that breaks it.
     fn in_every_view(&mut self, check: impl Fn(&mut Self, &View) -> Result<(), String>) -> Result<(), Broken> {
-        self.views.iter().try_for_each(|view| check(self, &view.1).map_err(|why| Broken { view: *view, why }))
+        self.views.iter().try_for_each(|view| check(self, &view.1).map_err(|why| Broken::new(*view, why)))
     }
 }
 
@@ -207,7 +214,7 @@ fn teleport_and_return(subject: &mut Subject) -> Result<(), Broken> {
     views.iter().zip(views.iter().skip(3).chain(views)).try_for_each(|(view, (_, away))| {
         let same = same_after_a_journey(subject, &view.1, away, uploads);
         let same = same.and_then(|same| ensure(same, || "another list after a journey".into()));
-        same.map_err(|why| Broken { view: *view, why })
+        same.map_err(|why| Broken::new(*view, why))
     })
 }
 

@@ -51,10 +51,10 @@ fn half_a_million(form: &Form) -> Vec<Finding> {
         let named = ("corner", *view);
         let (size, limits) = (list.size(), technique.limits());
         if !limits.hold(&size) {
-            fits = fits.and(Err(Broken { view: named, why: format!("{size:?} exceeds {limits:?}") }));
+            fits = fits.and(Err(Broken::new(named, format!("{size:?} exceeds {limits:?}"))));
         }
         let fine = all_numbers(&field, technique.as_ref(), view, &list);
-        numbers = numbers.and(fine.map_err(|why| Broken { view: named, why }));
+        numbers = numbers.and(fine.map_err(|why| Broken::new(named, why)));
     }
     vec![
         Finding::holds("lists fit the limits", fits),

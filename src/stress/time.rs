@@ -52,8 +52,10 @@ fn flown(name: &str, time_s: fn(usize) -> f64) -> Flight {
 fn there_and_back() -> Flight {
     let field = Arc::new(land());
     let fine = path(&field, "circle", 40 * FRAMES);
-    let frame =
-        |k: usize| View { time_s: TIME_STEP_S * k as f64, ..fine[if k / 6 % 2 == 0 { k % 6 } else { 5 - k % 6 }] };
+    let frame = |k: usize| View {
+        time_s: TIME_STEP_S * k as f64,
+        ..fine[if (k / 6).is_multiple_of(2) { k % 6 } else { 5 - k % 6 }]
+    };
     Flight { views: (0..2 * FRAMES).map(frame).collect(), field }
 }
 
