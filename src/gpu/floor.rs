@@ -10,7 +10,7 @@ use super::bindings::{Bindings, Bound};
 use super::device::Gpu;
 use super::frames::Recording;
 use super::memory::barriers;
-use super::pages::{self, Sampling};
+use super::pages::{self, Sampler, Sampling};
 use super::pipelines::{self, Description};
 use super::shaders::Constants;
 use super::target::{self, Offscreen};
@@ -21,16 +21,16 @@ pub struct Floor {
     gpu: Arc<Gpu>,
     bindings: Bindings,
     pipeline: vk::Pipeline,
-    sampler: vk::Sampler,
+    _sampler: Sampler,
 }
 
 impl Floor {
     /// Makes the pass for a scene, whose descriptors have the layout `scene`, over pictures of this target.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout, target: &Offscreen) -> Result<Self> {
         let sampler = pages::sampler(gpu, Sampling::Texels)?;
-        let depth = Bound::Texture(sampler, target.depth_image().view, vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL);
+        let depth = Bound::Texture(sampler.raw, target.depth_image().view, vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL);
         let bindings = Bindings::new(gpu, "floor", Some(scene), vk::ShaderStageFlags::FRAGMENT, &[depth], 0)?;
-        let mut floor = Self { gpu: Arc::clone(gpu), bindings, pipeline: vk::Pipeline::null(), sampler };
+        let mut floor = Self { gpu: Arc::clone(gpu), bindings, pipeline: vk::Pipeline::null(), _sampler: sampler };
         floor.pipeline = pipelines::make(
             gpu,
             floor.bindings.layout,
@@ -81,7 +81,6 @@ impl Drop for Floor {
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
             self.gpu.raw.destroy_pipeline(self.pipeline, None);
-            self.gpu.raw.destroy_sampler(self.sampler, None);
         }
     }
 }

@@ -158,8 +158,22 @@ pub enum Sampling {
     Repeated,
 }
 
-/// A sampler; the owner destroys it.
-pub fn sampler(gpu: &Gpu, sampling: Sampling) -> Result<vk::Sampler> {
+/// A sampler. What uses it has ended when it is dropped.
+pub struct Sampler {
+    /// The sampler.
+    pub raw: vk::Sampler,
+    gpu: Arc<Gpu>,
+}
+
+impl Drop for Sampler {
+    fn drop(&mut self) {
+        // SAFETY: it is not in use any more.
+        unsafe { self.gpu.raw.destroy_sampler(self.raw, None) };
+    }
+}
+
+/// Makes a sampler.
+pub fn sampler(gpu: &Arc<Gpu>, sampling: Sampling) -> Result<Sampler> {
     let (filter, mipmap) = match sampling {
         Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),
         Sampling::Clamped | Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
@@ -178,7 +192,7 @@ pub fn sampler(gpu: &Gpu, sampling: Sampling) -> Result<vk::Sampler> {
         .address_mode_w(mode)
         .max_lod(vk::LOD_CLAMP_NONE);
     // SAFETY: the device is alive.
-    let sampler = unsafe { gpu.raw.create_sampler(&info, None) }?;
-    gpu.name(sampler, name);
-    Ok(sampler)
+    let raw = unsafe { gpu.raw.create_sampler(&info, None) }?;
+    gpu.name(raw, name);
+    Ok(Sampler { raw, gpu: Arc::clone(gpu) })
 }

@@ -12,7 +12,7 @@ use super::driven::Driven;
 use super::frames::{Recording, SLOTS, once};
 use super::materials;
 use super::memory::{Buffer, Image, memory_barrier};
-use super::pages::{self, Sampling};
+use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
@@ -28,7 +28,7 @@ pub struct Terrain {
     resident: Resident,
     slots: Vec<Slot>,
     descriptors: vk::DescriptorPool,
-    samplers: [vk::Sampler; IMAGES],
+    samplers: [Sampler; IMAGES],
     images: [Image; IMAGES],
     driven: Option<Driven>,
 }
@@ -93,8 +93,9 @@ impl Terrain {
             pages::sampler(gpu, Sampling::Repeated)?,
             pages::sampler(gpu, heights)?,
         ];
-        let descriptors = descriptor_pool(gpu)?;
         let resident = Resident::new(gpu, kept.geometry)?;
+        let driven = driven(gpu, kept.driver)?;
+        let descriptors = descriptor_pool(gpu)?;
         let mut terrain = Self {
             gpu: Arc::clone(gpu),
             pipelines,
@@ -104,7 +105,7 @@ impl Terrain {
             descriptors,
             samplers,
             images,
-            driven: driven(gpu, kept.driver)?,
+            driven,
         };
         terrain.make_slots()?;
         Ok(terrain)
@@ -118,7 +119,7 @@ impl Terrain {
         let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
         self.slots = sets.into_iter().map(|set| Slot::new(gpu, set, &self.limits)).collect::<Result<_>>()?;
         for slot in &self.slots {
-            slot.describe(gpu, &self.images, self.samplers);
+            slot.describe(gpu, &self.images, &self.samplers);
         }
         Ok(())
     }
@@ -431,13 +432,16 @@ impl Slot {
         }
     }
 
-    fn describe(&self, gpu: &Gpu, images: &[Image; IMAGES], samplers: [vk::Sampler; IMAGES]) {
+    fn describe(&self, gpu: &Gpu, images: &[Image; IMAGES], samplers: &[Sampler; IMAGES]) {
         let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let infos: Vec<_> = images
             .iter()
             .zip(samplers)
-            .map(|(image, sampler)| [vk::DescriptorImageInfo { sampler, image_view: image.view, image_layout: layout }])
+            .map(|(image, sampler)| {
+                let (sampler, image_view) = (sampler.raw, image.view);
+                [vk::DescriptorImageInfo { sampler, image_view, image_layout: layout }]
+            })
             .collect();
         let write = vk::WriteDescriptorSet::default().dst_set(self.set);
         let mut writes =
@@ -473,9 +477,6 @@ impl Drop for Terrain {
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
             self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
-            for sampler in self.samplers {
-                self.gpu.raw.destroy_sampler(sampler, None);
-            }
         }
     }
 }

@@ -60,7 +60,7 @@ pub fn answers(
     let output = Buffer::new(gpu, "answers", bytes as u64, storage, MemoryLocation::GpuToCpu)?;
     let bound = [
         Bound::Uniform(&uniform),
-        Bound::Texture(sampler, heights.view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+        Bound::Texture(sampler.raw, heights.view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
         Bound::Storage(&input),
         Bound::Storage(&output),
     ];
@@ -79,7 +79,6 @@ pub fn answers(
             Ok(())
         });
         gpu.raw.destroy_pipeline(pipeline, None);
-        gpu.raw.destroy_sampler(sampler, None);
         ran?;
     }
     Ok(bytemuck::cast_slice(&output.read()[..bytes]).to_vec())

@@ -35,6 +35,13 @@ const ABSENT: &str = "–";
 /// A column of the cases' tables: its name and what a case has there.
 type Column = (&'static str, fn(&CaseResult) -> Option<String>);
 
+/// Fragments a covered pixel, and how many of them pass the depth test.
+fn overdraw(result: &CaseResult) -> Option<String> {
+    let economy = result.errors.as_ref()?.economy.as_ref()?;
+    let passed = economy.passed.map_or(String::new(), |passed| format!(" <small>{} pass</small>", number(passed)));
+    Some(number(economy.overdraw?) + &passed)
+}
+
 /// What a case took.
 const TIMES: &[Column] = &[
     ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
@@ -50,8 +57,7 @@ const TIMES: &[Column] = &[
     ("near-optimal ×", |r| r.errors.as_ref()?.reference?.multiple.map(number)),
     ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
     ("below a pixel, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
-    ("overdraw", |r| r.errors.as_ref()?.economy.as_ref()?.overdraw.map(number)),
-    ("past depth, a pixel", |r| r.errors.as_ref()?.economy.as_ref()?.passed.map(number)),
+    ("overdraw", overdraw),
     ("held, %", |r| r.time.as_ref()?.held.map(|h| number(100.0 * h.settled))),
     ("mean tolerance, px", |r| r.time.as_ref()?.held.map(|h| number(h.tolerance_px.mean))),
     ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),

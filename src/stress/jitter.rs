@@ -148,7 +148,7 @@ pub fn save_maps(folder: &Path) -> Result<Vec<Picture>> {
             let jitter = Jitter::of(origin_m, way);
             let [w, h] = jitter.size;
             let map = resize(&jitter.map(), ENLARGED * w, ENLARGED * h, FilterType::Nearest);
-            let file = format!("jitter-{place}-{way:?}.png").to_lowercase().replace(' ', "-");
+            let file = format!("jitter-{place}-{way:?}.png").to_lowercase().replace(' ', "-").replace('\'', "");
             let path = folder.join(&file);
             map.save(&path).with_context(|| path.display().to_string())?;
             let caption = format!("Jitter at {place}, {name}: at most {:.3}", jitter.max_px());

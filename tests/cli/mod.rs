@@ -159,6 +159,8 @@ fn an_exported_cave_is_closed() {
     let args = ["export", "cave-floor.tif", "--ceiling", "cave-ceiling.tif", "-o", "cave.obj"];
     let counts = json(folder.path(), &[&args[..], &["--technique", "sorted-strips"]].concat());
     assert!(counts["triangles"].as_u64().unwrap() > 2000);
+    let painter = [&args[..], &["--technique", "sorted-strips", "--set", "order=painter"]].concat();
+    refused(folder.path(), &painter, &["ceiling", "order=painter"]);
     let obj = std::fs::read_to_string(folder.path().join("cave.obj")).unwrap();
     let lines = |first: &str| obj.lines().filter_map(move |line| line.strip_prefix(first)).collect::<Vec<_>>();
     let vertices: Vec<Vec<f64>> =

@@ -12,46 +12,72 @@ use cuesta::scene::{Copy, Scene};
 
 use super::{aslant, on_device, technique};
 
-/// Draws a picture and measures it with everything that has device memory of its own: capture, oracle, floor, truth.
+/// Draws a picture.
+fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
+    with_scene(gpu, field, technique, |scene, technique| {
+        let view = aslant(field, [64, 40], 2.0);
+        let mut stage = scene.stage(technique, view.size)?;
+        stage.draw(technique, &view, Copy::PictureAndDepth)?;
+        stage.complete()
+    })
+}
+
+/// Measures a picture with everything that has device memory of its own: floor, capture, oracle, probe, truth.
 fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
+    with_scene(gpu, field, technique, |scene, technique| {
+        let view = aslant(field, [64, 40], 2.0);
+        let mut stage = scene.stage(technique, view.size)?;
+        stage.draw(technique, &view, Copy::PictureAndDepth)?;
+        stage.complete()?;
+        stage.draw_floor(&view, Copy::Picture)?;
+        stage.capture(technique, &view)?;
+        stage.errors(technique, &view)?;
+        stage.draw_probed(technique, "probed", &view)?;
+        Truth::new(scene, &view).map(|_| ())
+    })
+}
+
+fn with_scene(
+    gpu: &Arc<Gpu>,
+    field: &Arc<Field>,
+    technique: &mut dyn Technique,
+    work: impl FnOnce(&Scene, &mut dyn Technique) -> Result<()>,
+) -> Result<()> {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
-    let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
-    let view = aslant(field, [64, 40], 2.0);
-    let mut stage = scene.stage(technique, view.size)?;
-    stage.draw(technique, &view, Copy::PictureAndDepth)?;
-    stage.complete()?;
-    stage.draw_floor(&view, Copy::Picture)?;
-    stage.capture(technique, &view)?;
-    stage.errors(technique, &view)?;
-    stage.draw_probed(technique, "probed", &view)?;
-    Truth::new(&scene, &view)?;
-    Ok(())
+    work(&Scene { gpu, field, plan: &plan, look: &look, overlay: None }, technique)
+}
+
+type Work = fn(&Arc<Gpu>, &Arc<Field>, &mut dyn Technique) -> Result<()>;
+
+/// Fails the first allocation, then the second, until none is left to fail; how many there are.
+fn fail_each(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work) -> u64 {
+    let bytes = || gpu.device_bytes().values().sum::<u64>();
+    let empty = bytes();
+    for failures in 0.. {
+        gpu.limit_allocations(failures);
+        let outcome = work(gpu, field, technique(field, name, &[]).as_mut());
+        gpu.limit_allocations(u64::MAX);
+        assert_eq!(bytes(), empty, "{name}: bytes left after {failures} allocations");
+        let Err(error) = outcome else { return failures };
+        let text = format!("{error:#}");
+        assert!(text.contains("out of memory") && !text.contains('\n'), "{name}, {failures}: {text}");
+    }
+    unreachable!("it ends when nothing fails")
 }
 
 #[test]
 fn running_out_at_any_allocation_is_an_error_and_leaks_nothing() {
-    let field = Arc::new(synth::synth(synth::Kind::Fractal, [129, 97], 3));
+    let field = Arc::new(synth::synth(synth::Kind::Fractal, [65, 49], 3));
     on_device(|gpu| {
-        let bytes = || gpu.device_bytes().values().sum::<u64>();
-        let empty = bytes();
         for entry in TECHNIQUES {
-            let variants = entry.variants.iter().map(|variant| format!("{}:{}", entry.name, variant.name));
-            for name in std::iter::once(entry.name.to_string()).chain(variants) {
-                let mut failures = 0;
-                loop {
-                    gpu.limit_allocations(failures);
-                    let outcome = measured(gpu, &field, technique(&field, &name, &[]).as_mut());
-                    assert_eq!(bytes(), empty, "{name}: bytes left after {failures} allocations");
-                    let Err(error) = outcome else { break };
-                    let text = format!("{error:#}");
-                    assert!(text.contains("out of memory") && !text.contains('\n'), "{name}, {failures}: {text}");
-                    failures += 1;
-                }
-                assert!(failures > 10, "{name}: {failures} allocations");
-                println!("{name}: an error at each of {failures} allocations");
-            }
+            let count = fail_each(gpu, &field, entry.name, drawn);
+            println!("{}: an error at each of {count} allocations", entry.name);
+            assert!(count > 10, "{}: {count} allocations", entry.name);
         }
-        gpu.limit_allocations(u64::MAX);
+        let driven = fail_each(gpu, &field, "clusters:gpu-driven", drawn);
+        let all = fail_each(gpu, &field, "clusters", measured);
+        println!("selecting on the device: {driven}; measured: {all}");
+        assert!(driven > 10 && all > driven, "{driven} and {all}");
     });
 }

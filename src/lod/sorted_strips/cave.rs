@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::certified::{Certified, bounds};
+use super::certified::{Certified, bounds, guarded};
 use super::footprint::Footprint;
 use super::measure::Errors;
 use super::pages::{Gaze, Grid, Pages, Row};
@@ -45,6 +45,8 @@ pub struct CaveStrips {
     rows: Vec<RowWorker>,
     sequence: Sequence,
     limits: Limits,
+    /// Parts of the picture beside it in which squares are as fine as in it.
+    guard: f64,
     nothing: Geometry,
 }
 
@@ -55,6 +57,11 @@ pub struct CaveStrips {
 pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
     if technique != ENTRY.name {
         return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
+    }
+    if settings.word("order") == "painter" {
+        return Err(
+            "a ceiling: expected order=front, back or shuffled, found order=painter: it needs depth".to_string()
+        );
     }
     match settings.word("level") {
         "certified" => Ok(()),
@@ -70,7 +77,7 @@ struct RowWorker {
 }
 
 impl CaveStrips {
-    /// Measures both fields. Of the room's settings it takes `page` and `order`; levels are certified.
+    /// Measures both fields. Of the room's settings it takes `page`, `order` and `guard`; levels are certified.
     pub fn new(cave: Arc<Cave>, settings: &Settings) -> Self {
         let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MOST_PAGES);
         let (pages, cells) = (grid.count[0] as usize * grid.count[1] as usize, grid.side() as usize);
@@ -92,6 +99,7 @@ impl CaveStrips {
             rows: Vec::new(),
             sequence: Sequence::of(settings.word("order")),
             limits,
+            guard: settings.number("guard"),
             nothing: Geometry::default(),
         }
     }
@@ -116,10 +124,10 @@ impl CaveStrips {
         self.splits.clear();
         // A split square has at least six triangles more, floor and ceiling twice as many.
         let most = self.limits.indices / 18 + 1;
-        [self.cave.floor(), self.cave.ceiling()]
-            .into_iter()
-            .zip(&self.errors)
-            .all(|(field, errors)| Certified::new(field, errors, &self.pages, [view; 2], most).split(&mut self.splits))
+        let seen = guarded(view, self.guard);
+        [self.cave.floor(), self.cave.ceiling()].into_iter().zip(&self.errors).all(|(field, errors)| {
+            Certified::new(field, errors, &self.pages, [view, &seen], most).split(&mut self.splits)
+        })
     }
 
     /// Walks the rows of a frame; `false` if they do not fit.
