@@ -2,7 +2,7 @@
 //! controller on loads that are hard to hold; the loaders on broken files. A case passes when the picture and the
 //! numbers are right, not when nothing crashed.
 //!
-//! A case is a row of [`CASES`]; what is found in it, a [`Row`] for each technique and check. A technique that is new
+//! A case is a row of [`FAMILIES`]; what is found in it, a [`Row`] for each technique and check. A technique that is new
 //! in the table is in the battery.
 
 mod arithmetic;
