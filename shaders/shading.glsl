@@ -3,12 +3,19 @@
 layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
 layout(set = 0, binding = 3) uniform sampler2D overlay;
 
+// The overlay as maps of its pages (src/texture/picture_maps.rs): tiles, and for each page which one and its level.
+layout(set = 0, binding = 6) uniform sampler2DArray maps;
+layout(set = 0, binding = 7, scalar) readonly buffer MapTable { uint map_table[]; };
+
 layout(constant_id = 3) const bool HOLES = false;
 layout(constant_id = 4) const bool FOG = false;
-// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch (plan::Colour).
+// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch, 6 maps (plan::Colour).
 layout(constant_id = 5) const uint COLOUR = 0;
 // The height texture can be filtered linearly by the device.
 layout(constant_id = 6) const bool FILTERED = false;
+
+// Side of a page of the overlay as a power of two; 0: it is there as a whole.
+layout(constant_id = 13) const uint MAP_SHIFT = 0;
 
 bool is_hole(ivec2 at) {
     return texelFetch(hole_pages, texel(clamp(at, ivec2(0), frame.last)), 0).r != 0;
@@ -138,6 +145,34 @@ vec3 error_colour(float px) {
     return px > 1.0 ? vec3(1.0) : high;
 }
 
+// The picture laid over the field. A tile's first and last texels are its neighbours' too, so that linear filtering
+// within it leaves no seam.
+struct Tile { vec2 share; uint slot; uint level; };
+
+Tile tile_at(Cell cell) {
+    uvec2 page = uvec2(cell.at) >> MAP_SHIFT;
+    uint columns = (uint(frame.last.x) + (1u << MAP_SHIFT) - 1u) >> MAP_SHIFT;
+    uint entry = map_table[page.y * columns + page.x];
+    uint shift = MAP_SHIFT + (entry & 15u);
+    ivec2 first = (cell.at >> shift) << shift;
+    vec2 share = (vec2(cell.at - first) + cell.inside) / float(1u << shift);
+    return Tile(share, entry >> 4, entry & 15u);
+}
+
+vec3 overlay_albedo(Cell cell, vec2 lattice) {
+    if (MAP_SHIFT == 0) return texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
+    Tile tile = tile_at(cell);
+    float side = float(textureSize(maps, 0).x);
+    return textureLod(maps, vec3((tile.share * (side - 1.0) + 0.5) / side, float(tile.slot)), 0.0).rgb;
+}
+
+// Which tile that is: a hue a level, with a dark edge.
+vec3 tile_colour(Cell cell) {
+    Tile tile = tile_at(cell);
+    vec2 edge = min(tile.share, 1.0 - tile.share);
+    return palette(tile.level) * (min(edge.x, edge.y) < 0.02 ? 0.2 : 1.0);
+}
+
 // Whether there is no land at a lattice position.
 bool is_open(vec2 lattice) {
     return HOLES && in_hole(cell_at(lattice));
@@ -158,7 +193,8 @@ vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
         ground = ground_albedo(spot, share_of_range(height), normal);
     }
     if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
-    else if (COLOUR == 2) albedo = texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
+    else if (COLOUR == 2) albedo = overlay_albedo(cell, lattice);
+    else if (COLOUR == 6) albedo = MAP_SHIFT == 0 ? overlay_albedo(cell, lattice) : tile_colour(cell);
     else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
     else if (COLOUR == 5) albedo = palette(level_batch.y);
     else if (DETAIL) albedo = ground;

@@ -220,6 +220,17 @@ impl View {
         Some(Projected { pixel: centre + DVec2::new(p.x, -p.y) * scale, depth })
     }
 
+    /// The same picture with so many pixels more on every side.
+    pub fn with_margin(&self, px: u32) -> Self {
+        let size = self.size.map(|side| side + 2 * px);
+        let wider = f64::from(size[0]) / f64::from(self.size[0]);
+        let lens = match self.lens {
+            Lens::Perspective { fov_x } => Lens::Perspective { fov_x: 2.0 * ((fov_x / 2.0).tan() * wider).atan() },
+            Lens::Orthographic { width, far } => Lens::Orthographic { width: width * wider, far },
+        };
+        Self { lens, size, ..*self }
+    }
+
     /// Whether a projected point lies in the picture.
     pub fn in_picture(&self, at: &Projected) -> bool {
         let size = DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
@@ -343,6 +354,19 @@ mod tests {
         assert!(pixel.distance(projected.pixel) < 1e-9);
         assert!((clip.w - projected.depth).abs() < 1e-9);
         assert!((clip.z / clip.w - 0.1 / projected.depth).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_margin_shifts_pixels_and_changes_nothing_else() {
+        let parallel = View { lens: Lens::Orthographic { width: 70.0, far: 900.0 }, ..view(1.0) };
+        for view in [view(1.0), parallel] {
+            let wide = view.with_margin(16);
+            assert_eq!(wide.size, [352, 232]);
+            let point = view.eye + view.forward() * 50.0 + DVec3::new(3.0, 4.0, -5.0);
+            let [inner, outer] = [view, wide].map(|view| view.project(point).unwrap());
+            assert!((outer.pixel - inner.pixel).distance(DVec2::splat(16.0)) < 1e-9);
+            assert!((wide.focal_px() - view.focal_px()).abs() < 1e-9);
+        }
     }
 
     /// Random boxes: displacing any of their visible points by the allowed error keeps the tolerance, and

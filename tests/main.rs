@@ -4,6 +4,7 @@ mod architecture;
 mod bench;
 mod cli;
 mod conformance;
+mod fuzz;
 #[cfg(feature = "vulkan")]
 mod gpu;
 mod height;

@@ -32,7 +32,7 @@ pub struct DeviceLaboratory {
     gpu: Arc<Gpu>,
     look: Look,
     /// The scene whose truths are kept, and they, by frame.
-    truths: (String, BTreeMap<usize, Truth>),
+    truths: (String, BTreeMap<usize, Arc<Truth>>),
 }
 
 impl DeviceLaboratory {
@@ -59,7 +59,7 @@ impl DeviceLaboratory {
     }
 
     /// The truth of a frame: drawn once for all cases of a scene.
-    fn truth(&mut self, scene: &Scene, frame: usize) -> Result<&Truth> {
+    fn truth(&mut self, scene: &Scene, frame: usize) -> Result<Arc<Truth>> {
         let name = scene.case.scene();
         if self.truths.0 != name {
             self.truths = (name, BTreeMap::new());
@@ -70,9 +70,9 @@ impl DeviceLaboratory {
             let look = self.look.after(frame as f64 * TIME_STEP_S);
             let of_frame = scene::Scene { look: &look, ..self.scene(scene.field, &plan) };
             let truth = Truth::new(&of_frame, &scene.views[frame])?;
-            self.truths.1.insert(frame, truth);
+            self.truths.1.insert(frame, Arc::new(truth));
         }
-        Ok(&self.truths.1[&frame])
+        Ok(Arc::clone(&self.truths.1[&frame]))
     }
 }
 
@@ -92,7 +92,7 @@ impl Laboratory for DeviceLaboratory {
             Device { name: candidate.name.clone(), driver: candidate.driver.clone(), is_cpu: candidate.is_software() };
         let plan = |(terrain, field): &(Terrain, Arc<Field>)| {
             let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-            let (kept, left_out) = plan.decisions(field);
+            let (kept, left_out) = plan.decisions(field, None);
             let [kept, left_out] = [kept, left_out].map(|all| all.into_iter().map(decision).collect());
             Ok(Plan { terrain: terrain.name.clone(), kept, left_out })
         };
@@ -147,7 +147,10 @@ impl Laboratory for DeviceLaboratory {
             if is_measured {
                 let truth = self.truth(scene, frame)?;
                 let fragments = [times.gpu.statistics.map(|[.., run]| run), times.gpu.passed];
-                look(scene, (frame, view), technique.as_ref(), &mut stage, truth, fragments, &mut pool)?;
+                look(scene, (frame, view), technique.as_ref(), &mut stage, &truth, fragments, &mut pool)?;
+                let plan = self.plan(scene.field, technique.as_ref())?;
+                let drawn = self.scene(scene.field, &plan);
+                pool.hole_pixels(truth.hole_pixels(&drawn, view, &stage.picture())?.len());
                 if let Some((from, resident, list)) = &before {
                     let old = pop::State { view: from, resident, list };
                     let new = pop::State { view, resident: technique.resident(), list: &stage.list };
@@ -203,7 +206,6 @@ fn look(
     }
     pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
-    pool.hole_pixels(truth.hole_pixels(view, &picture).len());
     pool.skirt_pixels(skirts(&picture).into_iter().filter(|&is| is).count());
     pool.picture(frame, &picture, &truth.picture)
 }

@@ -14,6 +14,7 @@ pub const ROWS: &str = "rows.jsonl";
 
 /// The file of rows of one run, open for more.
 pub struct Journal {
+    name: String,
     file: File,
     header: Header,
     rows: Vec<Row>,
@@ -32,7 +33,7 @@ impl Journal {
         let file = OpenOptions::new().create(true).append(true).open(&path).with_context(|| name.clone())?;
         file.set_len(whole as u64).with_context(|| name.clone())?;
         if rows.is_empty() {
-            let mut journal = Self { file, header: header.clone(), rows };
+            let mut journal = Self { name, file, header: header.clone(), rows };
             journal.write(&Row::Header(header))?;
             return Ok(journal);
         }
@@ -40,7 +41,7 @@ impl Journal {
         if let Some(what) = difference(&found, &header) {
             bail!("{name}: holds another run's rows, whose {what}; expected the same, or another --out");
         }
-        Ok(Self { file, header: found, rows })
+        Ok(Self { name, file, header: found, rows })
     }
 
     /// Adds a row; on return it is on the disk.
@@ -52,7 +53,8 @@ impl Journal {
 
     fn write(&mut self, row: &Row) -> Result<()> {
         let line = serde_json::to_string(row)? + "\n";
-        self.file.write_all(line.as_bytes()).and_then(|()| self.file.sync_data()).context(ROWS)
+        let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.sync_data());
+        written.with_context(|| self.name.clone())
     }
 
     /// What the rows have in common.

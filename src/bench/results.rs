@@ -167,7 +167,8 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
     };
     let median = |cost: Cost| Estimate::median(&rounds.iter().map(cost).collect::<Vec<_>>());
     let floors: Option<Vec<f64>> = rounds.iter().map(|r| r.floor_ms.map(|floor| r.frame_ms.p50 / floor.p50)).collect();
-    let frames = (rounds.len() * result.case.frames).max(1);
+    // Rows are text that anyone may have written: sums of any numbers are no fault.
+    let frames = rounds.len().saturating_mul(result.case.frames).max(1);
     Some(TimeSummary {
         frame_ms: median(frame_ms),
         frame_p95_ms: over(|r| r.frame_ms.p95),
@@ -182,15 +183,19 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         over_base: over_base(frame_ms),
         cpu_ms: median(cpu_ms),
         cpu_over_base: over_base(cpu_ms),
-        hitches_percent: 100.0 * rounds.iter().map(|r| r.hitches).sum::<usize>() as f64 / frames as f64,
+        hitches_percent: 100.0 * rounds.iter().map(|r| r.hitches as f64).sum::<f64>() / frames as f64,
         triangles: over(|r| r.triangles.mean),
         draws: over(|r| r.draws.mean),
         commands: over(|r| r.commands.mean),
         widening: rounds.iter().map(|r| r.widening).fold(1.0, f64::max),
         held: Held::median(&rounds.iter().filter_map(|r| r.held).collect::<Vec<_>>()),
-        device_bytes: rounds.iter().map(|r| r.device_bytes.values().sum()).max().unwrap_or(0),
+        device_bytes: rounds.iter().map(device_bytes).max().unwrap_or(0),
         figures: rounds.last().map(|r| r.figures.clone()).unwrap_or_default(),
     })
+}
+
+fn device_bytes(round: &Times) -> u64 {
+    round.device_bytes.values().fold(0, |all, bytes| all.saturating_add(*bytes))
 }
 
 /// What is looked at in a round, milliseconds.

@@ -139,8 +139,11 @@ impl Run<'_> {
     pub fn run(&self, laboratory: &mut dyn Laboratory, header: Header, at: &mut dyn FnMut(Step)) -> Result<Ended> {
         let mut journal = Journal::open(self.folder, header)?;
         let ended = self.missing_rows(laboratory, &mut journal, at);
-        results::write(self.folder)?;
-        ended
+        let written = results::write(self.folder);
+        // The first failure is the one to tell of.
+        let ended = ended?;
+        written?;
+        Ok(ended)
     }
 
     fn missing_rows(
@@ -159,10 +162,17 @@ impl Run<'_> {
                 return Ok(Ended::Stopped);
             }
             at(Step { done: [k, tasks.len()], case: task.case });
-            let row = self.row(laboratory, &mut flights, *task).with_context(|| task.case.to_string())?;
-            journal.append(row)?;
+            let row = self.row(laboratory, &mut flights, *task);
+            let row = row.with_context(|| format!("{}: {}", self.kept(journal), task.case))?;
+            journal.append(row).with_context(|| self.kept(journal))?;
         }
         Ok(Ended::Complete)
+    }
+
+    /// What a failure does not take away.
+    fn kept(&self, journal: &Journal) -> String {
+        let rows = journal.rows().len();
+        format!("{}: {rows} rows are kept, the same command goes on there", self.folder.display())
     }
 
     /// Scene by scene: the rounds, in each all cases in turn, then the errors.

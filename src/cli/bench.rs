@@ -1,8 +1,6 @@
 //! `cuesta bench`: error against run time along named paths; `cuesta bench compare`: what changed.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 
 use anyhow::{Context, Result, ensure};
@@ -12,7 +10,7 @@ use serde::Serialize;
 
 use super::cases::{Choice, Planned};
 use super::scene::{GroundArgs, ReadArgs, size};
-use super::{Common, Outcome, report};
+use super::{Common, Outcome, interrupt, report};
 use crate::bench::compare::{THRESHOLD, compare};
 use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
@@ -150,8 +148,8 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let mut laboratory = laboratory(common, args.ground.over(Look::default())?)?;
     let header = header(laboratory.as_mut(), &planned)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(Arc::clone(&stop));
+    // The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
+    let stop = interrupt::flag();
     let run = Run {
         folder,
         cases: planned.cases,
@@ -165,9 +163,11 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         bar.set_length(step.done[1] as u64);
         bar.set_position(step.done[0] as u64);
         bar.set_message(step.case.to_string());
-    })?;
+    });
     bar.finish_and_clear();
-    let page = crate::report::write(folder)?;
+    // A page of the rows that are there is worth having, and no reason to hide why there are no more.
+    let page = crate::report::write(folder);
+    let (ended, page) = (ended?, page?);
     let found = Results::read(folder)?;
     let rows = crate::bench::journal::read(folder)?.1.len();
     let complete = ended == Ended::Complete;
@@ -179,16 +179,6 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let is_missed = found.cases.iter().any(CaseResult::is_torn) || !messages.is_empty();
     report::print(common, &Done { results, report: page, rows, complete, validation_messages: messages })?;
     Ok(if is_missed { Outcome::LimitMissed } else { Outcome::Done })
-}
-
-/// The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
-fn stop_on_interrupt(stop: Arc<AtomicBool>) {
-    // A second handler in one process is refused; then Ctrl-C ends the process.
-    let _ = ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
 }
 
 fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {

@@ -19,6 +19,11 @@ pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
     Some(seed.and_then(|seed| land(terrain, seed, options)))
 }
 
+/// Whether this is [`named`] so.
+pub fn is_named(terrain: &str) -> bool {
+    named(terrain, &Options::default()).is_some()
+}
+
 /// It is not read from a file, and nothing can be said about how.
 fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     let Options { max_samples, hole_fill, .. } = *options;

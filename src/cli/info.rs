@@ -8,9 +8,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
-use super::{Common, Outcome, report, working_set};
+use super::{Common, Outcome, plan, report, working_set};
 use crate::height::Loaded;
-use crate::plan::{Decision, DeviceLimits, ScenePlan};
 
 /// Arguments.
 #[derive(Args, Debug)]
@@ -24,6 +23,9 @@ pub struct InfoArgs {
     /// What this scene needs on the device, and what it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
+    /// Also how much each feature that is left out would take: each is kept once, for so many frames of the view.
+    #[arg(long, value_name = "FRAMES", requires = "plan", num_args = 0..=1, default_missing_value = "30")]
+    pub measure: Option<usize>,
     /// Draws which nodes of a map of 2^36 texels over the field the view needs, and how fine: a .png.
     #[arg(long, value_name = "FILE", requires = "terrain", conflicts_with = "plan")]
     pub working_set: Option<PathBuf>,
@@ -86,22 +88,6 @@ impl Info {
     }
 }
 
-/// What a scene keeps and leaves out, and what its technique prepared.
-#[derive(Serialize)]
-struct Plan {
-    technique: &'static str,
-    kept: Vec<Decision>,
-    left_out: Vec<Decision>,
-    figures: Vec<Figure>,
-}
-
-#[derive(Serialize)]
-struct Figure {
-    name: &'static str,
-    value: f64,
-    unit: &'static str,
-}
-
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     if args.devices {
@@ -122,26 +108,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);
     }
-    let (look, _) = args.look.build(terrain)?;
-    let plan = ScenePlan::new(&loaded.field, &look, &device_limits(common)?).map_err(anyhow::Error::msg)?;
-    let (entry, _) = args.technique.settings()?;
-    let field = Arc::new(loaded.field);
-    let technique = args.technique.build(common, &field)?;
-    let (kept, left_out) = plan.with_manner(technique.manner()).decisions(&field);
-    let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
-    report::print(common, &Plan { technique: entry.name, kept, left_out, figures })?;
-    Ok(Outcome::Done)
-}
-
-#[cfg(feature = "vulkan")]
-fn device_limits(common: &Common) -> Result<DeviceLimits> {
-    Ok(super::render::open(common, false)?.device_limits())
-}
-
-/// Without Vulkan, plans are made for what every desktop device has.
-#[cfg(not(feature = "vulkan"))]
-fn device_limits(_: &Common) -> Result<DeviceLimits> {
-    Ok(DeviceLimits { image_side: 16384, image_layers: 2048, filters_heights: true })
+    plan::run(common, args, terrain, &Arc::new(loaded.field))
 }
 
 #[cfg(not(feature = "vulkan"))]

@@ -5,6 +5,8 @@ pub mod cases;
 pub mod endless;
 pub mod export;
 pub mod info;
+pub mod interrupt;
+pub mod plan;
 #[cfg(feature = "vulkan")]
 pub mod profile;
 pub mod redraw;
@@ -16,11 +18,13 @@ pub mod stress;
 pub mod synth;
 #[cfg(feature = "viewer")]
 pub mod view;
+pub mod whole;
 pub mod working_set;
 
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 /// Large terrain drawn with a bounded error.
@@ -53,6 +57,9 @@ pub struct Common {
     /// Device memory is out after so many allocations: to try what happens then.
     #[arg(long, global = true, value_name = "N")]
     pub allocations: Option<u64>,
+    /// The device is lost after so many calls that would notice: to try what happens then.
+    #[arg(long, global = true, value_name = "N")]
+    pub lose_device: Option<u64>,
 }
 
 /// The subcommands.
@@ -92,27 +99,40 @@ pub enum Outcome {
 
 /// Parses the command line and runs it. Failures and wrong use are one line on stderr and exit code 2.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) if !error.use_stderr() => {
-            print!("{error}");
-            return ExitCode::SUCCESS;
-        }
-        Err(error) => {
-            let text = error.to_string();
-            let line: Vec<_> = text.lines().map(str::trim).take_while(|l| !l.is_empty()).collect();
-            eprintln!("{}", line.join(" "));
-            return ExitCode::from(2);
-        }
+    panic::set_hook(Box::new(fault));
+    interrupt::install();
+    let outcome = match Cli::try_parse() {
+        Ok(cli) => match panic::catch_unwind(AssertUnwindSafe(|| run(cli))) {
+            Ok(outcome) => outcome,
+            // The hook has told of it.
+            Err(_) => return ExitCode::from(2),
+        },
+        Err(error) if !error.use_stderr() => report::say(error.to_string().trim_end()).map(|()| Outcome::Done),
+        Err(error) => Err(anyhow!(one_line(&error))),
     };
-    match run(cli) {
+    match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::LimitMissed) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {}", format!("{error:#}").replace('\n', " "));
+            report::note(format!("error: {error:#}").replace('\n', " "));
             ExitCode::from(2)
         }
     }
+}
+
+/// What is wrong with a command line, in one line.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines: Vec<_> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    let line = lines.join(" ");
+    line.strip_prefix("error: ").map_or(line.clone(), str::to_string)
+}
+
+/// A fault of the program itself: where it is and what it says, in one line.
+fn fault(info: &PanicHookInfo) {
+    let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
+    let said = info.payload_as_str().unwrap_or("no words").replace('\n', " ");
+    report::note(format_args!("error: a fault of cuesta's own at {place}: {said}"));
 }
 
 fn run(cli: Cli) -> Result<Outcome> {
@@ -140,7 +160,7 @@ fn without_subcommand(common: &Common) -> Result<Outcome> {
     if view::has_display() {
         return run_words(common, &["view", "demo"]);
     }
-    eprintln!("no display: rendering cuesta.png instead");
+    report::note("no display: rendering cuesta.png instead");
     run_words(common, &["render", "demo", "-o", "cuesta.png"])
 }
 
@@ -153,7 +173,7 @@ fn run_words(common: &Common, words: &[&str]) -> Result<Outcome> {
 
 #[cfg(not(feature = "vulkan"))]
 fn without_subcommand(_: &Common) -> Result<Outcome> {
-    Cli::command().print_help()?;
+    report::say(Cli::command().render_help())?;
     Ok(Outcome::Done)
 }
 

@@ -82,6 +82,8 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let forms = forms(common, args, &field)?;
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+    let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
+    let plan = plan.with_overlay(&field, &look, &gpu.device_limits(), picture).map_err(anyhow::Error::msg)?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     files::make_folder(&args.out)?;
     let spinner = report::spinner(common, "profiling");
@@ -111,7 +113,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     if common.json {
         report::print(common, &document)?;
     } else if !common.quiet {
-        say(&document);
+        say(&document)?;
     }
     Ok(if document.validation_messages.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
@@ -141,13 +143,14 @@ fn capture(common: &Common, measured: &mut Measured) -> Result<Option<Capture>> 
     Ok(Some(Capture { mode, file }))
 }
 
-fn say(document: &Document) {
-    print!("{}", table::text(&document.profile));
-    println!("trace: {} (open it in https://ui.perfetto.dev)", document.trace.display());
+fn say(document: &Document) -> Result<()> {
+    report::say(table::text(&document.profile).trim_end())?;
+    report::say(format_args!("trace: {} (open it in https://ui.perfetto.dev)", document.trace.display()))?;
     if let Some(capture) = &document.capture {
-        println!("capture: {} of {}", capture.file.display(), capture.mode);
+        report::say(format_args!("capture: {} of {}", capture.file.display(), capture.mode))?;
     }
     for message in &document.validation_messages {
-        eprintln!("validation: {}", message.replace('\n', " "));
+        report::note(format_args!("validation: {}", message.replace('\n', " ")));
     }
+    Ok(())
 }

@@ -21,6 +21,7 @@ use crate::measure::watertight;
 use crate::plan::ScenePlan;
 use crate::scene::holes::{Truth, skirts};
 use crate::scene::{Scene, Shot};
+use crate::texture::picture_maps;
 use crate::view::{Metric, View};
 
 /// Arguments.
@@ -73,6 +74,9 @@ struct Rendered {
     record_ms: f64,
     gpu_ms: f64,
     device_bytes: u64,
+    /// What is there of a picture laid over that exceeds the memory for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    texture_maps: Option<picture_maps::Figures>,
     validation_messages: Vec<String>,
     #[serde(flatten)]
     measured: Option<Measured>,
@@ -110,6 +114,7 @@ impl From<Summary> for Statistics {
 pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
     let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)?;
     gpu.limit_allocations(common.allocations.unwrap_or(u64::MAX));
+    gpu.lose_after(common.lose_device.unwrap_or(u64::MAX));
     Ok(gpu)
 }
 
@@ -141,6 +146,8 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
+    let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
+    let plan = plan.with_overlay(&field, &look, &gpu.device_limits(), picture).map_err(anyhow::Error::msg)?;
     let plan = plan.with_manner(technique.manner());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
@@ -172,6 +179,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         record_ms: shot.times.record_ms,
         gpu_ms: shot.times.gpu.total_ms,
         device_bytes: shot.device_bytes,
+        texture_maps: shot.maps,
         validation_messages: messages.clone(),
         measured,
     };
@@ -186,7 +194,7 @@ fn ms(since: Instant) -> f64 {
 fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -> Result<Measured> {
     let errors = geometric::errors(scene.field, view, technique.resident(), &shot.list);
     let proof = watertight::prove_list(scene.field, view, technique.manner().seams, technique.resident(), &shot.list);
-    let holes = Truth::new(scene, view)?.hole_pixels(view, &shot.picture);
+    let holes = Truth::new(scene, view)?.hole_pixels(scene, view, &shot.picture)?;
     let (width, frame) = (view.size[0] as usize, Frame::placing(scene.field, view));
     Ok(Measured {
         error_px: errors.screen_px.into(),

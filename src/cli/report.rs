@@ -1,10 +1,12 @@
-//! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr.
+//! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr. Whoever reads may be
+//! gone (`| head`): what is said then is said to nobody, and the work goes on.
 
 use std::fmt;
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde::Serialize;
 use serde_json::Value;
@@ -14,28 +16,42 @@ use crate::height::Error;
 use crate::height::progress::Progress;
 use crate::height::save::replace;
 
+/// A line on stdout.
+///
+/// # Errors
+/// Where there is no room for it; not where nobody reads.
+pub fn say(line: impl fmt::Display) -> Result<()> {
+    match writeln!(io::stdout().lock(), "{line}") {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("stdout"),
+    }
+}
+
+/// A line on stderr; where that cannot be written there is no one left to tell.
+pub fn note(line: impl fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
 /// Prints a result: as one JSON document, or one line a field.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
     let value = serde_json::to_value(result)?;
     if common.json {
-        println!("{}", serde_json::to_string_pretty(&value)?);
+        say(serde_json::to_string_pretty(&value)?)?;
     } else if let (Value::Object(fields), false) = (value, common.quiet) {
         for (name, value) in fields.iter().filter(|(_, value)| !value.is_null()) {
-            print_field(&name.replace('_', " "), value);
+            print_field(&name.replace('_', " "), value)?;
         }
     }
     Ok(())
 }
 
-fn print_field(name: &str, value: &Value) {
+fn print_field(name: &str, value: &Value) -> Result<()> {
     match value {
         Value::Array(rows) if rows.iter().any(Value::is_object) => {
-            println!("{name}:");
-            for row in rows {
-                println!("  {}", plain(row));
-            }
+            say(format_args!("{name}:"))?;
+            rows.iter().try_for_each(|row| say(format_args!("  {}", plain(row))))
         }
-        _ => println!("{name}: {}", plain(value)),
+        _ => say(format_args!("{name}: {}", plain(value))),
     }
 }
 
@@ -54,7 +70,7 @@ fn plain(value: &Value) -> String {
 /// Says something that is no failure, on stderr.
 pub fn warn(common: &Common, text: &str) {
     if !common.quiet {
-        eprintln!("warning: {text}");
+        note(format_args!("warning: {text}"));
     }
 }
 

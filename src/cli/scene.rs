@@ -5,14 +5,21 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec3;
 
+use super::whole::Whole;
 use super::{Common, endless, report};
 use crate::height::cave::Cave;
 use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
 use crate::lod::{self, Settings, Technique};
-use crate::plan::{Colour, Look};
+use crate::plan::{Colour, Forced, Look};
 use crate::view::{Lens, Metric, Tolerance, View};
+
+/// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
+/// a tenth of a millimetre.
+const FARTHEST_M: f64 = 1e12;
+/// The shortest that is asked for, metres, and the finest tolerance, pixels.
+const FINEST: f64 = 1e-9;
 
 /// Where heights come from.
 #[derive(Args, Debug, Clone)]
@@ -124,6 +131,9 @@ pub struct LookArgs {
     /// A picture laid over the field.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
+    /// Device memory for the overlay, megabytes: a larger one is there in maps of its pages, finer where they are seen.
+    #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
     #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>, allow_hyphen_values = true)]
     pub sun: Option<[f64; 2]>,
@@ -138,8 +148,8 @@ pub struct LookArgs {
     pub ground: GroundArgs,
 }
 
-/// What the ground is like from near, and a sun that moves.
-#[derive(Args, Debug, Clone, Copy)]
+/// What the ground is like from near, a sun that moves, and features by hand.
+#[derive(Args, Debug, Clone)]
 pub struct GroundArgs {
     /// Show grass, rock, scree and snow from near, by slope and height.
     #[arg(long)]
@@ -148,6 +158,12 @@ pub struct GroundArgs {
     /// `--time` in a picture.
     #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0, allow_negative_numbers = true)]
     pub sun_speed: f64,
+    /// Keep features that the scene does not need: see `info --plan`.
+    #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
+    pub keep: Vec<String>,
+    /// Leave features out.
+    #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
+    pub leave_out: Vec<String>,
 }
 
 impl GroundArgs {
@@ -156,7 +172,11 @@ impl GroundArgs {
         if !self.sun_speed.is_finite() {
             bail!("--sun-speed {}: expected degrees a second", self.sun_speed);
         }
-        Ok(Look { detail: self.detail, sun_speed: self.sun_speed, ..look })
+        let named =
+            |names: &[String], keep: bool, forced| names.iter().try_fold(forced, |f: Forced, n| f.with(n, keep));
+        let forced = named(&self.keep, true, look.forced).map_err(|why| anyhow!("--keep {why}"))?;
+        let forced = named(&self.leave_out, false, forced).map_err(|why| anyhow!("--leave-out {why}"))?;
+        Ok(Look { detail: self.detail, sun_speed: self.sun_speed, forced, ..look })
     }
 }
 
@@ -184,6 +204,8 @@ pub enum ColourArg {
     Normal,
     /// Draw.
     Batch,
+    /// Level and edges of the overlay's maps (--texture-memory).
+    Maps,
 }
 
 impl MetricArg {
@@ -215,7 +237,14 @@ fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], S
 
 fn pair_or_one(text: &str) -> Result<[f64; 2], String> {
     let pair = numbers::<f64, 2>(text).or_else(|_| numbers::<f64, 1>(text).map(|[s]| [s, s]))?;
-    if pair.iter().all(|s| s.is_finite() && *s > 0.0) { Ok(pair) } else { Err("expected positive metres".to_string()) }
+    if pair.iter().all(|&s| is_length(s)) { Ok(pair) } else { Err(format!("expected {LENGTHS}")) }
+}
+
+/// What [`is_length`] takes.
+const LENGTHS: &str = "1e-9 to 1e12 metres";
+
+fn is_length(metres: f64) -> bool {
+    (FINEST..=FARTHEST_M).contains(&metres)
 }
 
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
@@ -313,19 +342,23 @@ impl LookArgs {
         let colour = match (self.colour, &self.overlay) {
             (Some(ColourArg::Height), _) => Colour::Height,
             (Some(ColourArg::Level), _) => Colour::Level,
+            (Some(ColourArg::Error), _) if endless::is_named(terrain) => {
+                bail!("--colour error: {terrain} has no samples to be compared with")
+            }
             (Some(ColourArg::Error), _) => Colour::Error,
             (Some(ColourArg::Normal), _) => Colour::Normal,
             (Some(ColourArg::Batch), _) => Colour::Batch,
+            (Some(ColourArg::Maps), _) => Colour::Maps,
             (Some(ColourArg::Overlay), _) | (None, Some(_)) => Colour::Overlay,
             (None, None) if is_demo(terrain) => Colour::Overlay,
             (None, None) => Colour::Height,
         };
         let picture = match (&self.overlay, colour) {
-            (Some(path), Colour::Overlay) => Some(read_picture(path)?),
-            (None, Colour::Overlay) if is_demo(terrain) => {
+            (Some(path), Colour::Overlay | Colour::Maps) => Some(read_picture(path)?),
+            (None, Colour::Overlay | Colour::Maps) if is_demo(terrain) => {
                 Some(image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8())
             }
-            (None, Colour::Overlay) => bail!("--colour overlay: no picture given, expected --overlay IMG"),
+            (None, Colour::Overlay | Colour::Maps) => bail!("--colour: no picture given, expected --overlay IMG"),
             _ => None,
         };
         let defaults = Look::default();
@@ -334,11 +367,10 @@ impl LookArgs {
             bail!("--fog {}: expected a density of 0 or more per metre", self.fog);
         }
         let look = Look { colour, sun, fog: self.fog, wireframe: self.wireframe, ..defaults };
+        let look = Look { texture_bytes: 1_000_000 * self.texture_memory, ..look };
         Ok((self.ground.over(look)?, picture))
     }
-}
 
-impl LookArgs {
     /// The picture there is to lay over the field, whatever the colours say at first.
     pub fn picture(&self, terrain: &str) -> Result<Option<image::RgbaImage>> {
         Ok(LookArgs { colour: None, ..self.clone() }.build(terrain)?.1)
@@ -375,8 +407,8 @@ impl TechniqueArgs {
 
     /// The tolerance under the metric.
     pub fn tolerance(&self) -> Result<Tolerance> {
-        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
-            bail!("--tolerance {}: expected a positive number of pixels", self.tolerance);
+        if !(self.tolerance.is_finite() && self.tolerance >= FINEST) {
+            bail!("--tolerance {:?}: expected at least {FINEST:e} pixels", self.tolerance);
         }
         let metric = match self.metric {
             MetricArg::Certified => Metric::Certified,
@@ -404,84 +436,26 @@ impl ViewArgs {
         };
         let above = eye.y - field.height_at(eye.x, eye.z).unwrap_or(whole.centre.y);
         let near = self.near.unwrap_or((above.abs() / 1000.0).max(0.1));
-        if !(near.is_finite() && near > 0.0) {
-            bail!("--near {near}: expected a positive number of metres");
+        if !is_length(near) {
+            bail!("--near {near:?}: expected {LENGTHS}");
         }
         let lens = match self.ortho {
-            Some(width) if width.is_finite() && width > 0.0 => {
+            Some(width) if is_length(width) => {
                 Lens::Orthographic { width, far: near + 2.0 * (eye.distance(whole.centre) + whole.radius) }
             }
-            Some(width) => bail!("--ortho {width}: expected a positive number of metres"),
+            Some(width) => bail!("--ortho {width:?}: expected {LENGTHS}"),
             None => Lens::Perspective { fov_x: self.fov.to_radians() },
         };
         Ok(View { eye, world_from_eye, lens, size: self.size, near, tolerance, time_s: 0.0 })
     }
 }
 
-/// The field as one thing to look at.
-pub struct Whole {
-    /// Its centre at mean height.
-    pub centre: DVec3,
-    /// Half its diagonal, metres.
-    pub radius: f64,
-    /// From where all of it is seen, from the south and above.
-    pub eye: DVec3,
-    /// The eye's rotation there.
-    pub world_from_eye: DMat3,
-}
-
-impl Whole {
-    /// The view of a whole field for a horizontal field of view in degrees.
-    pub fn of(field: &Field, fov: f64, size: [u32; 2]) -> Self {
-        let statistics = field.statistics();
-        let [w, h] = field.size().map(|n| f64::from(n - 1));
-        let centre = field.world_at(w / 2.0, h / 2.0, statistics.mean);
-        let corners: Vec<_> = [statistics.min, statistics.max]
-            .into_iter()
-            .flat_map(|y| [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(i, j)| field.world_at(i, j, f64::from(y))))
-            .collect();
-        let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
-        let direction = DVec3::new(0.35, 0.6, 1.0).normalize_or(DVec3::Y);
-        let picture = DVec2::new(f64::from(size[0]), f64::from(size[1]));
-        let at = |distance: f64, aside: DVec3| View {
-            eye: centre + direction * distance + aside,
-            world_from_eye: View::looking_along(-direction),
-            lens: Lens::Perspective { fov_x: fov.to_radians() },
-            size,
-            near: radius * 1e-3,
-            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
-            time_s: 0.0,
-        };
-        // The rectangle around the corners on the screen, if all are in front of the eye.
-        let outline = |view: &View| {
-            let seen: Option<Vec<_>> = corners.iter().map(|&c| view.project(c).map(|p| p.pixel)).collect();
-            seen.map(|s| (s.iter().copied().fold(s[0], DVec2::min), s.iter().copied().fold(s[0], DVec2::max)))
-        };
-        // From afar, come closer while all of it fits, moving aside so that it stays in the middle.
-        let half_angle = (fov.to_radians() / 2.0).min(picture.y / (2.0 * at(1.0, DVec3::ZERO).focal_px()));
-        let mut view = at(4.0 * radius / half_angle.tan(), DVec3::ZERO);
-        let mut aside = DVec3::ZERO;
-        for step in 0..200 {
-            let distance = 4.0 * radius / half_angle.tan() * 0.97f64.powi(step);
-            let next = at(distance, aside);
-            let Some((low, high)) = outline(&next) else { break };
-            if !(high - low).cmple(picture * 0.94).all() {
-                break;
-            }
-            view = next;
-            let off = (low + high - picture) / 2.0 * distance / view.focal_px();
-            aside += view.world_from_eye * DVec3::new(off.x, -off.y, 0.0);
-        }
-        Self { centre, radius, eye: view.eye, world_from_eye: view.world_from_eye }
-    }
-}
-
 /// A position `X,Y,Z`, where Y may be `+H`, a height above the ground.
 fn position(flag: &str, text: &str, field: &Field) -> Result<DVec3> {
     let parts: Vec<_> = text.split(',').map(str::trim).collect();
-    let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, Y possibly +H above ground");
+    let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, 1e12 at most, Y possibly +H above ground");
     let &[x, y, z] = parts.as_slice() else { return Err(wrong()) };
-    let number = |part: &str| part.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+    let number = |part: &str| part.parse::<f64>().ok().filter(|v| v.abs() <= FARTHEST_M).ok_or_else(wrong);
     let (x, z) = (number(x)?, number(z)?);
     let y = match y.strip_prefix('+') {
         Some(above) => {

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::{Common, Outcome, report};
+use super::{Common, Outcome, interrupt, report};
 use crate::height::save::replace;
 use crate::stress::{self, Case, Eye, Finding, Kind, Row, SCHEMA, Stress, Trial, jitter, rows, saved, stiff};
 
@@ -40,7 +40,7 @@ pub struct StressArgs {
 pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
     let cases = chosen(args)?;
     if args.list {
-        cases.iter().for_each(|case| println!("{}: {}", case.family, case.name));
+        cases.iter().try_for_each(|case| report::say(format_args!("{}: {}", case.family, case.name)))?;
         return Ok(Outcome::Done);
     }
     let mut trials = stress::trials(&cases, &args.technique).map_err(anyhow::Error::msg)?;
@@ -49,28 +49,31 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
     }
     let mut device = Device::open(common, args)?;
     let bar = progress(common, &trials, device.eye().is_some());
-    let found = stress::run(&trials, device.eye(), |trial| {
+    let stop = interrupt::flag();
+    let found = stress::run(&trials, device.eye(), &stop, |trial| {
         bar.set_message(format!("{}: {}, {}", trial.case.family, trial.case.name, trial.technique()));
         bar.inc(1);
     });
     bar.finish_and_clear();
     let folder = args.out.clone().unwrap_or_else(|| FOLDER.into());
     let mut rows = Vec::new();
-    for (trial, findings) in trials.iter().zip(&found) {
+    for (trial, findings) in trials.iter().zip(&found.findings) {
         for finding in findings {
-            rows.push(row(&folder, trial, finding, device.eye())?);
+            rows.push(row(common, &folder, trial, finding, device.eye()));
         }
     }
     let (name, messages) = device.close();
     rows.extend(name.is_some().then(|| validation(&messages)).filter(|_| common.validate));
     let program = format!("cuesta {}", env!("CARGO_PKG_VERSION"));
-    let mut stress = Stress { schema: SCHEMA, program, device: name, cases: rows, pictures: Vec::new() };
-    if let Some(folder) = &args.out {
-        keep(folder, &mut stress)?;
-    }
+    let ended = found.ended;
+    let mut stress = Stress { schema: SCHEMA, program, device: name, ended, cases: rows, pictures: Vec::new() };
+    let kept = args.out.as_ref().map_or(Ok(()), |folder| keep(folder, &mut stress));
+    // What was found is said, whatever becomes of its files.
     say(common, &stress)?;
+    kept?;
     let [_, failed] = stress.counts();
-    Ok(if failed == 0 { Outcome::Done } else { Outcome::LimitMissed })
+    // What was not tried has not passed.
+    Ok(if failed == 0 && stress.ended.is_none() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
 /// The cases asked for.
@@ -97,15 +100,14 @@ fn progress(common: &Common, trials: &[Trial], draws: bool) -> ProgressBar {
     bar
 }
 
-fn row(folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Result<Row> {
+fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Row {
     let finite = |value: f64| value.is_finite().then_some(value);
-    let files = if finding.passes() {
+    // A row is worth more than its counter-example.
+    let files = counter_example(folder, trial, finding, eye).unwrap_or_else(|error| {
+        report::warn(common, &format!("no counter-example: {error:#}"));
         Vec::new()
-    } else {
-        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        saved::counter_example(folder, trial, finding, eye)?
-    };
-    Ok(Row {
+    });
+    Row {
         family: trial.case.family.to_string(),
         name: trial.case.name.to_string(),
         technique: trial.technique(),
@@ -116,7 +118,15 @@ fn row(folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye
         why: finding.broken.as_ref().map(ToString::to_string).or_else(|| finding.why.clone()),
         repeat: saved::command(trial),
         saved: files.iter().map(|file| file.display().to_string()).collect(),
-    })
+    }
+}
+
+fn counter_example(folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Result<Vec<PathBuf>> {
+    if finding.passes() {
+        return Ok(Vec::new());
+    }
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    saved::counter_example(folder, trial, finding, eye)
 }
 
 fn validation(messages: &[String]) -> Row {
@@ -150,16 +160,18 @@ fn keep(folder: &Path, stress: &mut Stress) -> Result<()> {
 }
 
 fn say(common: &Common, stress: &Stress) -> Result<()> {
+    if let Some(why) = &stress.ended {
+        report::warn(common, why);
+    }
     if common.json {
         return report::print(common, stress);
     }
     let [passed, failed] = stress.counts();
     if !common.quiet {
-        stress.cases.iter().for_each(|row| println!("{}", line(row)));
+        stress.cases.iter().try_for_each(|row| report::say(line(row)))?;
     }
-    stress.cases.iter().filter(|row| !row.pass && common.quiet).for_each(|row| println!("{}", line(row)));
-    println!("{passed} checks passed, {failed} failed");
-    Ok(())
+    stress.cases.iter().filter(|row| !row.pass && common.quiet).try_for_each(|row| report::say(line(row)))?;
+    report::say(format_args!("{passed} checks passed, {failed} failed"))
 }
 
 fn line(row: &Row) -> String {

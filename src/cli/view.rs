@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
-use super::{Common, Outcome, render, report};
+use super::{Common, Outcome, interrupt, render, report};
 use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;
 use crate::viewer::{self, Setup};
@@ -100,9 +100,10 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         vsync: args.vsync == Switch::On && args.frame_time.is_none(),
         seconds: args.seconds,
         save: report::save,
+        on_interrupt: interrupt::once,
     })?;
     for message in &summary.messages {
-        eprintln!("validation: {}", message.replace('\n', " "));
+        report::note(format_args!("validation: {}", message.replace('\n', " ")));
     }
     let viewed = Viewed {
         device: summary.device,

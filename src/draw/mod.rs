@@ -106,9 +106,24 @@ pub enum Hiding {
     ByOrder,
 }
 
+/// The kinds of draws that a technique's lists hold: what the executor has programs for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draws {
+    /// Some are of [`Source::Lattice`].
+    pub lattice: bool,
+    /// Some are of [`Source::Resident`] or [`Source::Streamed`]: one program draws both.
+    pub explicit: bool,
+    /// Some are [`Topology::Triangles`].
+    pub triangles: bool,
+    /// Some are [`Topology::Strip`].
+    pub strips: bool,
+}
+
 /// What a technique's lists ask of the programs that draw them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Manner {
+    /// What the lists hold.
+    pub draws: Draws,
     /// How lattice vertices move.
     pub morph: Morph,
     /// How meshes meet: which of the two proofs lists pass ([`watertight`](crate::measure::watertight)).
@@ -180,6 +195,24 @@ pub struct Kept<'a> {
     pub limits: Limits,
     /// How the device finds draws itself, if it can.
     pub driver: Option<&'a Driver>,
+}
+
+impl Default for Draws {
+    fn default() -> Self {
+        Self { lattice: true, explicit: false, triangles: true, strips: false }
+    }
+}
+
+impl Draws {
+    /// Triangles of explicit vertices, and no other draws.
+    pub const EXPLICIT: Self = Self { lattice: false, explicit: true, triangles: true, strips: false };
+
+    /// Whether such a draw is among them.
+    pub fn hold(&self, source: Source, topology: Topology) -> bool {
+        let has_source = if source == Source::Lattice { self.lattice } else { self.explicit };
+        let has_topology = if topology == Topology::Strip { self.strips } else { self.triangles };
+        has_source && has_topology
+    }
 }
 
 impl Topology {

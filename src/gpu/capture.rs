@@ -67,11 +67,9 @@ impl Capture {
         let (bound, constants) = ([Bound::Storage(&buffer)], size_of::<CapturedPart>());
         let bindings = Bindings::new(gpu, "capture", Some(scene), vk::ShaderStageFlags::VERTEX, &bound, constants)?;
         let mut capture = Self { gpu: Arc::clone(gpu), bindings, pipelines: BTreeMap::new(), buffer };
-        for source in [Source::Lattice, Source::Resident] {
-            for topology in [Topology::Triangles, Topology::Strip] {
-                let pipeline = pipelines::terrain(gpu, capture.bindings.layout, plan, Pass::Capture, source, topology)?;
-                capture.pipelines.insert((source, topology), pipeline);
-            }
+        for (source, topology) in pipelines::draws(plan) {
+            let pipeline = pipelines::terrain(gpu, capture.bindings.layout, plan, Pass::Capture, source, topology)?;
+            capture.pipelines.insert((source, topology), pipeline);
         }
         Ok(capture)
     }

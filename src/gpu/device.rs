@@ -11,6 +11,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::clock;
 use super::instance::{Instance, version_text};
+use super::loss::Presence;
 use crate::plan::DeviceLimits;
 
 /// Which device to take.
@@ -78,6 +79,7 @@ pub struct Gpu {
     pub(super) bytes: Mutex<std::collections::BTreeMap<&'static str, u64>>,
     /// Allocations that are still to succeed.
     allocations_left: AtomicU64,
+    pub(super) presence: Presence,
 }
 
 /// All devices of an instance, the usable ones first, the best first among them.
@@ -259,6 +261,7 @@ impl Gpu {
             timestamp_bits,
             bytes: Mutex::default(),
             allocations_left: AtomicU64::new(u64::MAX),
+            presence: Presence::default(),
         });
         gpu.name(queue, "queue");
         Ok(gpu)

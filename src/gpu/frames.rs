@@ -115,7 +115,8 @@ impl Frames {
         unsafe {
             self.gpu.raw.end_command_buffer(slot.commands)?;
             self.gpu.raw.reset_fences(&[slot.fence])?;
-            self.gpu.raw.queue_submit2(self.gpu.queue, &submit, slot.fence).context("submitting a frame")?;
+            let submitted = self.gpu.told(|| self.gpu.raw.queue_submit2(self.gpu.queue, &submit, slot.fence));
+            submitted.context("submitting a frame")?;
         }
         self.next = (self.next + 1) % SLOTS;
         Ok(())
@@ -132,7 +133,8 @@ impl Frames {
     fn wait(&mut self, slot: usize) -> Result<()> {
         let state = &mut self.slots[slot];
         // SAFETY: the fence belongs to the slot.
-        unsafe { self.gpu.raw.wait_for_fences(&[state.fence], true, u64::MAX) }.context("waiting for a frame")?;
+        let wait = || unsafe { self.gpu.raw.wait_for_fences(&[state.fence], true, u64::MAX) };
+        self.gpu.told(wait).context("waiting for a frame")?;
         if self.measured && !state.scopes.is_empty() {
             self.timing = state.timing(&self.gpu)?;
             state.scopes.clear();

@@ -14,6 +14,8 @@ pub mod frames;
 #[cfg(feature = "viewer")]
 pub mod hud;
 pub mod instance;
+mod live;
+mod loss;
 mod materials;
 pub mod memory;
 pub mod oracle;
@@ -28,6 +30,7 @@ pub mod shaders;
 pub mod swapchain;
 pub mod target;
 pub mod terrain;
+pub mod texture_slots;
 pub mod twin;
 
 pub use device::{Choice, Gpu};

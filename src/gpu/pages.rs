@@ -31,7 +31,10 @@ fn surface(gpu: &Arc<Gpu>, plan: &ScenePlan, purpose: &'static str, field: &Fiel
     let format = if plan.coded { vk::Format::R16_UNORM } else { vk::Format::R32_SFLOAT };
     paged(gpu, plan, purpose, format, plan.texel_bytes(), |first, count, row| match field.samples() {
         Samples::F32(heights) => row.extend_from_slice(bytemuck::cast_slice(&heights[first..first + count])),
-        Samples::Coded { codes, .. } => row.extend_from_slice(bytemuck::cast_slice(&codes[first..first + count])),
+        Samples::Coded { codes, .. } if plan.coded => {
+            row.extend_from_slice(bytemuck::cast_slice(&codes[first..first + count]))
+        }
+        coded => (first..first + count).for_each(|k| row.extend_from_slice(&coded.height(k).to_ne_bytes())),
     })
 }
 

@@ -1,6 +1,6 @@
 //! Pipelines: one per source that occurs, each specialised to the scene plan; and the sky's.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use std::sync::Arc;
 
@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
+use super::live;
 use super::shaders::{self, Constants};
 use super::target::Formats;
 use super::terrain::IMAGES;
@@ -32,8 +33,10 @@ pub struct Pipelines {
 impl Pipelines {
     /// Makes the pipelines for a plan, drawing to these formats.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, formats: Formats) -> Result<Self> {
-        let images = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; IMAGES];
+        // The scene's images, the picture's maps, and their table.
+        let images = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; IMAGES + 1];
         let kinds = std::iter::once(vk::DescriptorType::UNIFORM_BUFFER).chain(images);
+        let kinds = kinds.chain([vk::DescriptorType::STORAGE_BUFFER]);
         let bindings: Vec<_> = (0u32..)
             .zip(kinds)
             .map(|(binding, kind)| {
@@ -56,19 +59,20 @@ impl Pipelines {
         let (sky, has_depth) = (vk::Pipeline::null(), formats.depth.is_some());
         let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, has_depth, terrain: BTreeMap::new() };
         pipelines.sky = pipelines.make_sky(formats)?;
-        for source in [Source::Lattice, Source::Resident] {
-            for topology in [Topology::Triangles, Topology::Strip] {
-                let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
-                pipelines.terrain.insert((source, topology), pipeline);
-            }
+        for (source, topology) in draws(plan) {
+            let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
+            pipelines.terrain.insert((source, topology), pipeline);
         }
         Ok(pipelines)
     }
 
     /// The pipeline that draws such draws. Resident and streamed geometry share one.
+    ///
+    /// # Panics
+    /// If the plan has no such draws: techniques state them in their manner.
     pub fn terrain(&self, source: Source, topology: Topology) -> vk::Pipeline {
-        let own = self.terrain.get(&(source, topology));
-        *own.unwrap_or_else(|| &self.terrain[&(Source::Resident, topology)])
+        let program = if source == Source::Lattice { source } else { Source::Resident };
+        *self.terrain.get(&(program, topology)).expect("a kind of draw that the technique states")
     }
 
     fn make_sky(&self, formats: Formats) -> Result<vk::Pipeline> {
@@ -89,6 +93,15 @@ impl Pipelines {
     }
 }
 
+/// The kinds of draws of a plan, resident geometry standing for streamed too.
+pub(super) fn draws(plan: &ScenePlan) -> impl Iterator<Item = (Source, Topology)> {
+    let all = [Source::Lattice, Source::Resident]
+        .into_iter()
+        .flat_map(|source| [Topology::Triangles, Topology::Strip].map(|topology| (source, topology)));
+    let stated = plan.draws;
+    all.filter(move |&(source, topology)| stated.hold(source, topology))
+}
+
 /// What a terrain pipeline is for.
 #[derive(Clone, Copy)]
 pub(super) enum Pass {
@@ -96,6 +109,29 @@ pub(super) enum Pass {
     Picture(Formats),
     /// The vertices alone, to a buffer.
     Capture,
+}
+
+/// Whether such draws bring normals of their own.
+fn lit_by_vertices(plan: &ScenePlan, source: Source) -> bool {
+    plan.manner.normals == Normals::Vertices && source != Source::Lattice
+}
+
+/// The vertex and the fragment program that draw such draws.
+fn programs(plan: &ScenePlan, source: Source) -> [&'static str; 2] {
+    match source {
+        Source::Lattice => ["lattice.vert", "terrain.frag"],
+        _ if lit_by_vertices(plan, source) => ["explicit.normals.vert", "terrain.normals.frag"],
+        Source::Resident | Source::Streamed => ["explicit.vert", "terrain.frag"],
+    }
+}
+
+/// Pipelines that a plan's pictures need, and instructions of their programs once the plan's constants are known.
+pub fn size(plan: &ScenePlan) -> [usize; 2] {
+    let values = Constants::of(plan);
+    let sky = ["sky.vert", "sky.frag"];
+    let used: BTreeSet<_> = draws(plan).flat_map(|(source, _)| programs(plan, source)).chain(sky).collect();
+    let instructions = used.into_iter().map(|name| live::instructions(&shaders::words(name), values.words()));
+    [draws(plan).count() + 1, instructions.sum()]
 }
 
 /// Makes the pipeline that runs such draws through their vertex program.
@@ -116,20 +152,21 @@ pub(super) fn terrain(
             .stride(size_of::<Instance>() as u32)
             .input_rate(vk::VertexInputRate::INSTANCE),
     ];
-    let has_normals = plan.manner.normals == Normals::Vertices && source != Source::Lattice;
-    if has_normals && matches!(pass, Pass::Picture(_)) {
+    if lit_by_vertices(plan, source) && matches!(pass, Pass::Picture(_)) {
         bindings
             .push(vk::VertexInputBindingDescription::default().binding(2).stride(size_of::<VertexNormals>() as u32));
         let format = vk::Format::R32G32B32_UINT;
         attributes.push(vk::VertexInputAttributeDescription { location: 6, binding: 2, format, offset: 0 });
     }
-    let (name, [picture, capture]) = match source {
-        Source::Lattice => ("lattice", ["lattice.vert", "lattice.capture.vert"]),
-        Source::Resident | Source::Streamed => ("explicit", ["explicit.vert", "explicit.capture.vert"]),
+    let (name, capture) = match source {
+        Source::Lattice => ("lattice", "lattice.capture.vert"),
+        Source::Resident | Source::Streamed => ("explicit", "explicit.capture.vert"),
     };
     let (vertex, fragment, formats) = match pass {
-        Pass::Picture(formats) if has_normals => ("explicit.normals.vert", Some("terrain.normals.frag"), Some(formats)),
-        Pass::Picture(formats) => (picture, Some("terrain.frag"), Some(formats)),
+        Pass::Picture(formats) => {
+            let [vertex, fragment] = programs(plan, source);
+            (vertex, Some(fragment), Some(formats))
+        }
         Pass::Capture => (capture, None, None),
     };
     // Land is drawn first and hides; the far plane lies at depth 0.

@@ -31,7 +31,7 @@ pub fn module(gpu: &Gpu, name: &str) -> Result<vk::ShaderModule> {
 
 /// Bytes and map of specialization constants, ids counting from 0, four bytes each.
 pub struct Constants {
-    data: Vec<u8>,
+    data: Vec<u32>,
     entries: Vec<vk::SpecializationMapEntry>,
 }
 
@@ -39,10 +39,7 @@ impl Constants {
     /// Constants with these values, in the order of their ids.
     pub fn new(values: &[u32]) -> Self {
         let entry = |k: u32| vk::SpecializationMapEntry { constant_id: k, offset: 4 * k, size: 4 };
-        Self {
-            data: values.iter().flat_map(|v| v.to_ne_bytes()).collect(),
-            entries: (0..values.len() as u32).map(entry).collect(),
-        }
+        Self { data: values.to_vec(), entries: (0..values.len() as u32).map(entry).collect() }
     }
 
     /// What a scene's shaders leave out, in the order of their `constant_id`s.
@@ -62,11 +59,17 @@ impl Constants {
             flag(plan.manner.morph == Morph::ByDistance),
             flag(plan.stored.iter().all(|n| n.is_power_of_two())),
             flag(plan.ceiling),
+            plan.maps.map_or(0, |cut| cut.page_shift),
         ])
+    }
+
+    /// The values in the order of their ids.
+    pub fn words(&self) -> &[u32] {
+        &self.data
     }
 
     /// The description for a pipeline stage.
     pub fn info(&self) -> vk::SpecializationInfo<'_> {
-        vk::SpecializationInfo::default().data(&self.data).map_entries(&self.entries)
+        vk::SpecializationInfo::default().data(bytemuck::cast_slice(&self.data)).map_entries(&self.entries)
     }
 }

@@ -343,7 +343,7 @@ impl Swapchain {
         match error {
             vk::Result::ERROR_OUT_OF_DATE_KHR => self.state = State::Stale,
             vk::Result::ERROR_SURFACE_LOST_KHR => self.state = State::Lost,
-            other => return Err(other).context(doing),
+            other => return Err(self.gpu.failure(other)).context(doing),
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use super::memory::{Buffer, Image, memory_barrier};
 use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
+use super::texture_slots::{Overlay, TextureSlots};
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
 use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
 use crate::height::Field;
@@ -30,6 +31,8 @@ pub struct Terrain {
     descriptors: vk::DescriptorPool,
     samplers: [Sampler; IMAGES],
     images: [Image; IMAGES],
+    /// The maps of the picture laid over it.
+    pub overlay: Overlay,
     driven: Option<Driven>,
 }
 
@@ -75,7 +78,7 @@ impl Terrain {
         let images = [
             pages::heights(gpu, plan, field)?,
             pages::holes(gpu, plan, field)?,
-            pages::overlay(gpu, overlay)?,
+            pages::overlay(gpu, overlay.filter(|_| plan.maps.is_none()))?,
             materials::image(gpu, plan)?,
             pages::ceiling(gpu, plan, field)?,
         ];
@@ -105,6 +108,7 @@ impl Terrain {
             descriptors,
             samplers,
             images,
+            overlay: Overlay::new(gpu, plan, field, overlay)?,
             driven,
         };
         terrain.make_slots()?;
@@ -118,8 +122,8 @@ impl Terrain {
         // SAFETY: the pool holds as many sets as there are slots, and they are free.
         let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
         self.slots = sets.into_iter().map(|set| Slot::new(gpu, set, &self.limits)).collect::<Result<_>>()?;
-        for slot in &self.slots {
-            slot.describe(gpu, &self.images, &self.samplers);
+        for (slot, table) in self.slots.iter().zip(&self.overlay.tables) {
+            slot.describe(gpu, &self.images, &self.samplers, &self.overlay.slots, table);
         }
         Ok(())
     }
@@ -432,12 +436,21 @@ impl Slot {
         }
     }
 
-    fn describe(&self, gpu: &Gpu, images: &[Image; IMAGES], samplers: &[Sampler; IMAGES]) {
+    fn describe(
+        &self,
+        gpu: &Gpu,
+        images: &[Image; IMAGES],
+        samplers: &[Sampler; IMAGES],
+        maps: &TextureSlots,
+        table: &Buffer,
+    ) {
+        let table = [vk::DescriptorBufferInfo { buffer: table.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let infos: Vec<_> = images
             .iter()
             .zip(samplers)
+            .chain([(&maps.image, &maps.sampler)])
             .map(|(image, sampler)| {
                 let (sampler, image_view) = (sampler.raw, image.view);
                 [vk::DescriptorImageInfo { sampler, image_view, image_layout: layout }]
@@ -450,7 +463,9 @@ impl Slot {
             let kind = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
             writes.push(write.dst_binding(binding).descriptor_type(kind).image_info(info));
         }
-        // SAFETY: buffer and images live as long as the set.
+        let kind = vk::DescriptorType::STORAGE_BUFFER;
+        writes.push(write.dst_binding(infos.len() as u32 + 1).descriptor_type(kind).buffer_info(&table));
+        // SAFETY: buffers and images live as long as the set.
         unsafe { gpu.raw.update_descriptor_sets(&writes, &[]) };
     }
 }
@@ -461,8 +476,9 @@ fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
         vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
         vk::DescriptorPoolSize {
             ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-            descriptor_count: IMAGES as u32 * slots,
+            descriptor_count: (IMAGES as u32 + 1) * slots,
         },
+        vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: slots },
     ];
     let info = vk::DescriptorPoolCreateInfo::default().max_sets(slots).pool_sizes(&sizes);
     // SAFETY: the device is alive; Drop destroys the pool.

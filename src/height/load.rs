@@ -146,7 +146,7 @@ fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
         })
 }
 
-/// What loaders read from.
+/// What loaders read from. Nothing is mapped into memory: a file that shrinks while it is read is a read that fails.
 pub(super) trait Input: BufRead + Seek {}
 impl<T: BufRead + Seek> Input for T {}
 
@@ -270,5 +270,75 @@ pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result
         Kind::Raw => raw::read(source, options),
         Kind::Picture(format) => Err(source.error("content", format!("expected heights, found a {format} picture"))),
         Kind::Unknown => Err(source.error("content", raw::hint(source.len))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples, save};
+
+    /// A file that has changed by the time of its second look: what was there first, and what is there then.
+    struct Changing {
+        now: Cursor<Vec<u8>>,
+        then: Option<Vec<u8>>,
+    }
+
+    impl Read for Changing {
+        fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+            self.now.read(into)
+        }
+    }
+
+    impl Seek for Changing {
+        fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+            if let Some(then) = self.then.take() {
+                *self.now.get_mut() = then;
+            }
+            self.now.seek(to)
+        }
+    }
+
+    /// Reads a file that is `then` after its format was told.
+    fn changed(name: &str, first: &[u8], then: Vec<u8>, raw: Option<RawLayout>) -> Result<Loaded, Error> {
+        let len = first.len() as u64;
+        let mut reader = BufReader::with_capacity(16, Changing { now: Cursor::new(first.to_vec()), then: Some(then) });
+        let mut source = Source { name, reader: &mut reader, len, siblings: &|_| None };
+        let options = Options { raw, max_samples: 1 << 16, ..Options::default() };
+        let kind = source.kind(&options)?;
+        read(&mut source, kind, &options)?.finish(name, &options)
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_read_is_refused_or_read_as_one_of_the_two() {
+        let folder = tempfile::tempdir().unwrap();
+        let heights = (0..63).map(|k| (k * k % 50) as f32).collect();
+        let field = Field::new(Samples::F32(heights), [9, 7], [1.0; 2], Holes::none(63));
+        for (extension, raw) in [("tif", None), ("asc", None), ("png", None), ("raw", Some("9x7:u16le"))] {
+            let name = format!("land.{extension}");
+            save::save(&field, &folder.path().join(&name)).unwrap();
+            let whole = std::fs::read(folder.path().join(&name)).unwrap();
+            let raw = raw.map(|layout| layout.parse().unwrap());
+            let same = changed(&name, &whole, whole.clone(), raw).expect("nothing has changed");
+            let mut refused = 0;
+            for left in 0..whole.len() {
+                match changed(&name, &whole, whole[..left].to_vec(), raw) {
+                    // Of a text's last number no one can tell how many digits it had.
+                    Ok(_) if extension == "asc" && left + 3 > whole.len() => {}
+                    Ok(loaded) => assert_eq!(loaded.field.samples(), same.field.samples(), "{name}: {left} bytes left"),
+                    Err(error) => {
+                        let error = error.to_string();
+                        assert!(error.starts_with(&name) && !error.contains('\n'), "{left} bytes left: {error}");
+                        refused += 1;
+                    }
+                }
+            }
+            assert!(refused + 60 > whole.len(), "{name}: {refused} of {} were refused", whole.len());
+            // Longer by then.
+            let grown = [&whole[..], &whole].concat();
+            if let Ok(loaded) = changed(&name, &whole, grown, raw) {
+                assert_eq!(loaded.field.samples(), same.field.samples(), "{name}");
+            }
+        }
     }
 }

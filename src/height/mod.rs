@@ -21,6 +21,7 @@ mod png;
 pub mod progress;
 mod raster;
 mod raw;
+mod replace;
 pub mod rtin;
 mod sample;
 pub mod save;

@@ -1,17 +1,14 @@
 //! Writing a field: GeoTIFF, PNG, ESRI ASCII grid and raw 16 bit, by the file's extension.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use tiff::encoder::colortype::{ColorType, Gray32Float, GrayI16};
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, TiffKind, TiffValue};
 use tiff::tags::{Predictor, Tag};
 
+pub use super::replace::{Out, discard_unfinished, replace};
 use super::{Error, Field, Samples};
-
-/// A file while it is written.
-pub type Out<'a> = BufWriter<&'a File>;
 
 /// Writes all samples of `field`, tiling included, in the format of the extension, or leaves what was there.
 ///
@@ -34,22 +31,6 @@ pub fn save(field: &Field, path: &Path) -> Result<(), Error> {
         _ => return Err(fault(format!("expected .tif, .asc, .png, .r16 or .raw, found {extension:?}"))),
     };
     replace(path, |out| write(field, out)).map_err(|error| fault(error.to_string()))
-}
-
-/// Writes a file beside `path` and then gives it that name: readers see the old file or the new one, never a part.
-pub fn replace(path: &Path, write: impl FnOnce(&mut Out) -> io::Result<()>) -> io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // A temporary file is the owner's alone; a saved one is everyone's that the umask allows.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let file = builder.tempfile_in(folder)?;
-    let mut out = BufWriter::new(file.as_file());
-    write(&mut out)?;
-    out.flush()?;
-    drop(out);
-    file.persist(path)?;
-    Ok(())
 }
 
 /// Heights as 16-bit codes: height = (code − zero) · scale.

@@ -75,6 +75,12 @@ fn first_directory(source: &mut Source) -> io::Result<BTreeMap<u16, u64>> {
             3 => 2,
             4 | 13 => 4,
             16 | 18 => 8,
+            // The decoder tells of these on its own, on stderr.
+            2 if count > source.len => {
+                return Err(io::Error::other(format!(
+                    "expected a text within the file, found {count} bytes of tag {tag}"
+                )));
+            }
             2 | 5..=12 | 17 => continue,
             // The decoder skips too few bytes of these and reads the rest as entries.
             _ if big => return Err(io::Error::other(format!("expected a known type of tag {tag}, found {kind}"))),

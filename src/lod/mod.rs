@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Manner, Submission};
 use crate::height::Field;
-use crate::view::View;
+use crate::view::{Tolerance, View};
 pub use settings::{Setting, Settings, Values};
 
 /// A way to choose what is drawn.
@@ -68,10 +68,26 @@ pub trait Technique: Send {
         Manner::default()
     }
 
+    /// What it could have prepared and did not, as this field makes no use of it.
+    fn spared(&self) -> Vec<Spared> {
+        Vec::new()
+    }
+
     /// What is worth knowing about the data it prepared: name, value, unit.
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
         Vec::new()
     }
+}
+
+/// Something that a technique did not prepare.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spared {
+    /// What it is.
+    pub what: &'static str,
+    /// Why nothing uses it.
+    pub reason: String,
+    /// Device bytes that it would have taken.
+    pub bytes: u64,
 }
 
 /// A named form of a technique, chosen as `technique:variant`.
@@ -137,19 +153,84 @@ pub const TECHNIQUES: &[Entry] = &[
 const WIDENING: f64 = 1.5;
 
 /// What `select` makes of the view under its tolerance or, where it makes nothing because there is too much, under the first
-/// wider one; and what the tolerance was multiplied by.
+/// wider one; and what the tolerance was multiplied by. A wider tolerance never draws more, so that steps may be left out
+/// on the way: what is asked for may be a hundred powers of ten too fine. The last call is that of the answer.
 pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
-    let mut wider = *view;
-    loop {
-        if let Some(selected) = select(&wider) {
-            let is_kept = wider.tolerance.px == view.tolerance.px;
-            return (selected, if is_kept { 1.0 } else { wider.tolerance.px / view.tolerance.px });
+    if let Some(selected) = select(view) {
+        return (selected, 1.0);
+    }
+    let factor = |steps: i32| WIDENING.powi(steps);
+    let mut at = |steps: i32| {
+        let px = (view.tolerance.px.max(f64::MIN_POSITIVE) * factor(steps)).min(f64::MAX);
+        select(&View { tolerance: Tolerance { px, ..view.tolerance }, ..*view })
+    };
+    let [mut below, mut above] = [0, 1];
+    let mut selected = at(above);
+    while selected.is_none() {
+        (below, above) = (above, 2 * above);
+        selected = at(above);
+    }
+    while above - below > 1 {
+        let middle = below.midpoint(above);
+        match at(middle) {
+            Some(finer) => (above, selected) = (middle, Some(finer)),
+            None => (below, selected) = (middle, None),
         }
-        wider.tolerance.px = WIDENING * wider.tolerance.px.max(f64::MIN_POSITIVE);
+    }
+    loop {
+        if let Some(selected) = selected.take().or_else(|| at(above)) {
+            return (selected, factor(above));
+        }
+        above += 1;
     }
 }
 
 /// The row with this name.
 pub fn find(name: &str) -> Option<&'static Entry> {
     TECHNIQUES.iter().find(|entry| entry.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+
+    use crate::view::{Lens, Metric};
+
+    fn view(px: f64) -> View {
+        let tolerance = Tolerance { px, metric: Metric::Certified };
+        let (eye, world_from_eye) = (DVec3::ZERO, DMat3::IDENTITY);
+        View {
+            eye,
+            world_from_eye,
+            lens: Lens::Perspective { fov_x: 1.0 },
+            size: [9, 9],
+            near: 0.1,
+            tolerance,
+            time_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_first_tolerance_that_fits_is_found_soon_from_any_below() {
+        for steps in (0..40).chain([300, 1700]) {
+            let fits_from = 1.5f64.powi(steps) * (1.0 - 1e-9);
+            for scale in [1.0, 1e-3, 1e-290] {
+                let mut asked = Vec::new();
+                let select = |view: &View| {
+                    asked.push(view.tolerance.px);
+                    (view.tolerance.px >= scale * fits_from).then_some(view.tolerance.px)
+                };
+                let (px, widening) = widened(&view(scale), select);
+                assert_eq!(asked.last(), Some(&px), "what was selected last is the answer");
+                assert!((px / scale / fits_from - 1.0).abs() < 1e-6 && (widening * scale / px - 1.0).abs() < 1e-9);
+                assert!(
+                    asked.len() <= 24 && (steps > 1 || asked.len() as i32 == steps + 1),
+                    "{steps}: {}",
+                    asked.len()
+                );
+            }
+        }
+        assert!(widened(&view(1e-320), |view| (view.tolerance.px > 1.0).then_some(())).1 > 1e300);
+    }
 }

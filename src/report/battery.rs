@@ -13,9 +13,10 @@ use crate::stress::{Row, Stress};
 pub fn page(stress: &Stress, folder: &Path) -> String {
     let [passed, failed] = stress.counts();
     let device = stress.device.as_deref().unwrap_or("none: no pictures were drawn");
-    let facts = [("Program", stress.program.as_str()), ("Device", device)];
+    let ended = stress.ended.as_deref().map(|why| ("Not everything was tried", why));
+    let facts = [("Program", stress.program.as_str()), ("Device", device)].into_iter().chain(ended);
     let facts: String =
-        facts.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value))).collect();
+        facts.map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value))).collect();
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\

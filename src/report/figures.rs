@@ -233,7 +233,7 @@ fn histogram(
 ) -> Chart {
     let series = |result: &&CaseResult| {
         let bins = of(result.errors.as_ref()?)?;
-        let all: u64 = bins.iter().map(|bin| bin.count).sum();
+        let all = bins.iter().fold(0u64, |all, bin| all.saturating_add(bin.count));
         let name = format!("{}, {} px", result.case.series(), number(result.case.tolerance_px));
         let point = |bin: &Bin| {
             let y = 100.0 * bin.count as f64 / all as f64;

@@ -32,6 +32,7 @@ impl Stage {
     fn submit_deep(&mut self, view: &View) -> Result<()> {
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let mut recording = self.frames.begin()?;
+        self.terrain.overlay.look(&mut recording, view)?;
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         target::begin(&recording, self.offscreen.attachment(), self.offscreen.kept_depth());
         self.terrain.draw(&mut recording, &self.list)?;

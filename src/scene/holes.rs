@@ -17,6 +17,13 @@ const EXACT_PX: f64 = 1e-3;
 pub struct Truth {
     /// Its picture; alpha says where land is.
     pub picture: image::RgbaImage,
+    masks: Masks,
+}
+
+/// Where land is in a picture, pixel by pixel.
+struct Masks {
+    width: usize,
+    land: Vec<bool>,
     /// Pixels that land without data projects to, if there is such land.
     missing: Option<Vec<bool>>,
 }
@@ -25,18 +32,53 @@ impl Truth {
     /// Draws it.
     pub fn new(scene: &Scene, view: &View) -> Result<Self> {
         let picture = brute_force(scene, scene.field, view)?;
-        let has_holes = scene.field.holes().count() > 0;
-        Ok(Self { picture, missing: has_holes.then(|| missing_land(scene, view)).transpose()? })
+        Ok(Self { masks: Masks::new(scene, view, &picture)?, picture })
     }
 
     /// Pixels, row by row, of a picture of the same view that are open although land covers all of their
     /// neighbourhood in the truth. Where samples have no data, land within the tolerance of the truth may show what
-    /// the truth just hides: pixels that missing land projects to do not count.
-    pub fn hole_pixels(&self, view: &View, picture: &image::RgbaImage) -> Vec<usize> {
-        let (width, radius) = (view.size[0] as usize, picture::outline_radius(view.tolerance.px));
-        let mut holes = picture::hole_pixels(&covered(picture), &covered(&self.picture), width, radius);
+    /// the truth just hides: pixels that missing land projects to do not count. The neighbourhood does not end at the
+    /// edge of the picture: what is found beside it is looked at in a larger one.
+    pub fn hole_pixels(&self, scene: &Scene, view: &View, picture: &image::RgbaImage) -> Result<Vec<usize>> {
+        let radius = picture::outline_radius(view.tolerance.px);
+        let mut holes = self.masks.holes(&covered(picture), radius);
+        let [width, height] = view.size.map(|n| n as usize);
+        let is_beside = |n: usize, of: usize| n < radius || n + radius >= of;
+        if holes.iter().any(|&k| is_beside(k % width, width) || is_beside(k / width, height)) {
+            let real = real_holes(scene, view, picture, radius)?;
+            holes.retain(|k| real.contains(k));
+        }
+        Ok(holes)
+    }
+}
+
+/// Hole pixels of a picture as they are found in the middle of a truth with as much land around it as they depend on.
+fn real_holes(scene: &Scene, view: &View, picture: &image::RgbaImage, radius: usize) -> Result<Vec<usize>> {
+    let [inner, height] = view.size;
+    let room = scene.gpu.device_limits().image_side.saturating_sub(inner.max(height)) / 2;
+    let margin = room.min(radius as u32);
+    let wide = view.with_margin(margin);
+    let masks = Masks::new(scene, &wide, &brute_force(scene, scene.field, &wide)?)?;
+    let (inner, margin) = (inner as usize, margin as usize);
+    let mut drawn = vec![true; masks.land.len()];
+    for (row, covered) in covered(picture).chunks(inner).enumerate() {
+        drawn[(row + margin) * masks.width + margin..][..inner].copy_from_slice(covered);
+    }
+    let place = |k: usize| (k / masks.width - margin) * inner + k % masks.width - margin;
+    Ok(masks.holes(&drawn, radius).into_iter().map(place).collect())
+}
+
+impl Masks {
+    fn new(scene: &Scene, view: &View, picture: &image::RgbaImage) -> Result<Self> {
+        let has_holes = scene.field.holes().count() > 0;
+        let missing = has_holes.then(|| missing_land(scene, view)).transpose()?;
+        Ok(Self { width: view.size[0] as usize, land: covered(picture), missing })
+    }
+
+    fn holes(&self, covered: &[bool], radius: usize) -> Vec<usize> {
+        let mut holes = picture::hole_pixels(covered, &self.land, self.width, radius);
         if let Some(missing) = &self.missing {
-            let missing = picture::widened(missing, width, radius);
+            let missing = picture::widened(missing, self.width, radius);
             holes.retain(|&k| !missing[k]);
         }
         holes

@@ -4,6 +4,7 @@ pub mod capture;
 mod deep;
 pub mod holes;
 pub mod probed;
+pub mod savings;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,6 +16,7 @@ use crate::gpu::frames::{Frames, Timing};
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::target::{self, Offscreen};
 use crate::gpu::terrain::Terrain;
+use crate::gpu::texture_slots::Figures;
 use crate::gpu::{Gpu, capture::Capture, floor::Floor, probe::Probe};
 use crate::height::Field;
 use crate::lod::Technique;
@@ -84,6 +86,8 @@ pub struct Shot {
     pub times: Times,
     /// Device bytes in use while it was drawn.
     pub device_bytes: u64,
+    /// The maps of the picture laid over, where it is there in parts.
+    pub maps: Option<Figures>,
 }
 
 /// What a frame copies back to the host after the device's work was timed.
@@ -128,14 +132,27 @@ impl<'a> Scene<'a> {
     /// Draws one view `times` times; the times are medians.
     pub fn shoot(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
         let mut stage = self.stage(technique, view.size)?;
+        // Before anything is timed: a picture does not depend on how fast maps are made.
+        stage.settle(view)?;
         let drawn = (0..times.max(1)).map(|_| stage.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().values().sum();
         stage.complete()?;
-        Ok(Shot { picture: stage.picture(), list: stage.list, times: Times::median(drawn), device_bytes })
+        let maps = stage.maps();
+        Ok(Shot { picture: stage.picture(), maps, list: stage.list, times: Times::median(drawn), device_bytes })
     }
 }
 
 impl Stage {
+    /// Waits until the maps of the picture laid over are as fine as a view needs.
+    pub fn settle(&mut self, view: &View) -> Result<()> {
+        self.terrain.overlay.settle(&self.gpu, view)
+    }
+
+    /// What the maps of the picture laid over hold, where it is there in parts.
+    pub fn maps(&self) -> Option<Figures> {
+        self.terrain.overlay.figures()
+    }
+
     /// Selects and draws a view, and waits until the device has finished.
     pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let started = Instant::now();
@@ -145,6 +162,7 @@ impl Stage {
         self.frames.counts_passed = copy == Copy::PictureAndDepth;
         let mut recording = self.frames.begin()?;
         let uploading = Instant::now();
+        self.terrain.overlay.look(&mut recording, view)?;
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         let upload_ms = ms(uploading);
         let recorded = Instant::now();
@@ -213,6 +231,7 @@ impl Stage {
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let started = Instant::now();
         let mut recording = self.frames.begin()?;
+        self.terrain.overlay.look(&mut recording, view)?;
         self.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
         let upload_ms = ms(started);
         let recorded = Instant::now();

@@ -142,7 +142,10 @@ impl Stage {
     fn submit_probed(&mut self, steps: &mut Steps, view: &View, probe: &Probe, pieces: &[Piece]) -> Result<()> {
         let frame = self.look.frame(&self.field, view, self.range);
         let mut recording = self.frames.begin()?;
-        steps.time("upload", || self.terrain.prepare(&mut recording, &frame, &self.list))?;
+        steps.time("upload", || {
+            self.terrain.overlay.look(&mut recording, view)?;
+            self.terrain.prepare(&mut recording, &frame, &self.list)
+        })?;
         steps.time("record", || {
             self.terrain.select(&mut recording, &self.list)?;
             target::begin(&recording, self.offscreen.attachment(), deep::attachment(&self.plan, &self.offscreen));

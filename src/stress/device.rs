@@ -91,7 +91,8 @@ impl DeviceEye {
         stage.complete()?;
         let picture = stage.picture();
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        let holes = Truth::new(&self.scene(field, &plan), view)?.hole_pixels(view, &picture).len();
+        let scene = self.scene(field, &plan);
+        let holes = Truth::new(&scene, view)?.hole_pixels(&scene, view, &picture)?.len();
         if holes > 0 && seen.holes_at.is_none() {
             seen.holes_at = Some(Broken::new(named, format!("{holes} pixels of sky where land is")));
         }
@@ -147,6 +148,10 @@ impl Eye for DeviceEye {
         };
         let looked = self.look_at(&field, form, &views);
         looked.unwrap_or_else(|e| vec![Finding::within("drawn", 1.0, 0.0).because(Some(format!("{e:#}")))])
+    }
+
+    fn is_blind(&self) -> Option<String> {
+        self.gpu.is_lost().then(|| self.gpu.loss())
     }
 
     fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage> {

@@ -2,12 +2,13 @@
 //! world coordinates in single precision; double-precision differences to the eye rounded once; and the product's own,
 //! differences of whole samples to the one nearest the eye ([`place::relative_position`](crate::draw::place)).
 
+use std::io;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use glam::{DVec2, Mat4, Vec3, Vec4};
 use image::imageops::{FilterType, resize};
-use image::{Rgb, RgbImage};
+use image::{ImageFormat, Rgb, RgbImage};
 
 use super::Finding;
 use super::fields::hills_at;
@@ -15,6 +16,7 @@ use super::rows::Picture;
 use crate::draw::layout::Frame;
 use crate::draw::place::relative_position;
 use crate::height::Field;
+use crate::height::save::replace;
 use crate::measure::in_view;
 use crate::view::{Lens, Metric, Tolerance, View};
 
@@ -150,7 +152,8 @@ pub fn save_maps(folder: &Path) -> Result<Vec<Picture>> {
             let map = resize(&jitter.map(), ENLARGED * w, ENLARGED * h, FilterType::Nearest);
             let file = format!("jitter-{place}-{way:?}.png").to_lowercase().replace(' ', "-").replace('\'', "");
             let path = folder.join(&file);
-            map.save(&path).with_context(|| path.display().to_string())?;
+            replace(&path, |out| map.write_to(out, ImageFormat::Png).map_err(io::Error::other))
+                .with_context(|| path.display().to_string())?;
             let caption = format!("Jitter at {place}, {name}: at most {:.3}", jitter.max_px());
             pictures.push(Picture { file, caption });
         }

@@ -243,17 +243,19 @@ fn sorted(triangles: Vec<Drawn>) -> Vec<[(i32, i32, u32); 3]> {
     sorted
 }
 
-/// A list is within the technique's limits, and its ranges within what they address.
+/// A list is within the technique's limits, its ranges within what they address, and its draws of the kinds that the
+/// technique states.
 fn lists_fit(subject: &mut Subject) -> Result<(), Broken> {
     subject.in_every_view(|subject, view| {
         let list = subject.select(view)?;
         let (limits, size) = (subject.technique.limits(), list.size());
         ensure(limits.hold(&size), || format!("{size:?} exceeds {limits:?}"))?;
-        let resident = subject.technique.resident();
+        let (resident, draws) = (subject.technique.resident(), subject.technique.manner().draws);
         let addressed = |source| if source == Source::Streamed { &list.streamed } else { resident };
         list.draws.iter().try_for_each(|draw| {
             let fits = in_range(addressed(draw.source), draw) && draw.instances.end as usize <= list.instances.len();
-            ensure(fits, || format!("{draw:?} reaches outside"))
+            ensure(fits, || format!("{draw:?} reaches outside"))?;
+            ensure(draws.hold(draw.source, draw.topology), || format!("{draw:?} is none of {draws:?}"))
         })
     })
 }

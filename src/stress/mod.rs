@@ -26,6 +26,7 @@ pub mod device;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
@@ -119,6 +120,11 @@ pub trait Eye {
 
     /// A picture of a field, if it can be drawn.
     fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage>;
+
+    /// Why it can look no more, if so.
+    fn is_blind(&self) -> Option<String> {
+        None
+    }
 }
 
 /// A case with one technique or, if it needs none, without.
@@ -179,22 +185,50 @@ pub fn trials(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<Tria
     Ok(trials)
 }
 
-/// Runs trials on all cores, and then those with pictures on a device, if there is one; in the order of the trials.
-pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, progress: impl Fn(&Trial) + Sync) -> Vec<Vec<Finding>> {
-    let mut found: Vec<_> = trials
-        .par_iter()
-        .map(|trial| {
+/// What was found in trials, in their order.
+pub struct Found {
+    /// A list a trial; empty where it was not run.
+    pub findings: Vec<Vec<Finding>>,
+    /// Why there is no more, if something was left out.
+    pub ended: Option<String>,
+}
+
+/// Runs trials on all cores, and then those with pictures on a device, if there is one, until `stop` is set.
+pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, stop: &AtomicBool, progress: impl Fn(&Trial) + Sync) -> Found {
+    let run = |trial: &Trial| {
+        (!stop.load(Relaxed)).then(|| {
             progress(trial);
             trial.run()
         })
-        .collect();
+    };
+    let found: Vec<_> = trials.par_iter().map(run).collect();
+    let left_out = found.iter().filter(|findings| findings.is_none()).count();
+    let mut findings: Vec<_> = found.into_iter().map(Option::unwrap_or_default).collect();
+    let mut ended = (left_out > 0).then(|| format!("stopped: {left_out} of {} trials were not run", trials.len()));
     if let Some(eye) = eye {
-        for (trial, findings) in trials.iter().zip(&mut found) {
-            if let Some(form) = trial.form.as_ref().filter(|_| trial.is_drawn()) {
-                progress(trial);
-                findings.extend(eye.look(trial.case, form));
-            }
+        ended = ended.or(draw(trials, &mut findings, eye, stop, &progress));
+    }
+    Found { findings, ended }
+}
+
+/// Draws the trials that have pictures; why not all of them, if so.
+fn draw(
+    trials: &[Trial],
+    findings: &mut [Vec<Finding>],
+    eye: &mut dyn Eye,
+    stop: &AtomicBool,
+    progress: &impl Fn(&Trial),
+) -> Option<String> {
+    for (trial, findings) in trials.iter().zip(findings) {
+        let Some(form) = trial.form.as_ref().filter(|_| trial.is_drawn()) else { continue };
+        if stop.load(Relaxed) {
+            return Some("stopped: not all pictures were drawn".to_string());
+        }
+        progress(trial);
+        findings.extend(eye.look(trial.case, form));
+        if let Some(why) = eye.is_blind() {
+            return Some(format!("no more pictures: {why}"));
         }
     }
-    found
+    None
 }

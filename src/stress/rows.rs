@@ -47,6 +47,9 @@ pub struct Stress {
     pub program: String,
     /// The device that drew pictures, if there was one.
     pub device: Option<String>,
+    /// Why not everything was tried, if so: it was stopped, or the device was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended: Option<String>,
     /// All rows.
     pub cases: Vec<Row>,
     /// Pictures of what was measured: file and caption.

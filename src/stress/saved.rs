@@ -1,10 +1,11 @@
 //! Counter-examples: the field, the view, the mesh and the picture of a failure, and the command that draws it again.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
+use image::ImageFormat;
 
 use super::forms::Form;
 use super::laws::Broken;
@@ -53,7 +54,8 @@ pub fn counter_example(
     replace(&text, |out| writeln!(out, "{}", describe(&land, form, broken, trial))).with_context(|| written(&text))?;
     let mut files = vec![land, text, mesh];
     if let Some(drawn) = eye.and_then(|eye| eye.picture(&field, form, &broken.view.1)) {
-        drawn.save(&picture).with_context(|| written(&picture))?;
+        replace(&picture, |out| drawn.write_to(out, ImageFormat::Png).map_err(io::Error::other))
+            .with_context(|| written(&picture))?;
         files.push(picture);
     }
     Ok(files)

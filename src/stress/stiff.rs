@@ -1,11 +1,12 @@
 //! The budget controller on loads that are hard to hold, and where it is stable: slope of the cost over the tolerance
 //! against the delay of the costs, beside a fixed step and a pure proportion.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use image::{Rgb, RgbImage};
+use image::{ImageFormat, Rgb, RgbImage};
 use rayon::prelude::*;
 
 use super::forms::Form;
@@ -16,6 +17,7 @@ use super::rows::Picture;
 use super::{Case, Finding, Kind};
 use crate::bench::paths;
 use crate::draw::DrawList;
+use crate::height::save::replace;
 use crate::height::{Field, synth};
 use crate::lod::budget::{Controller, RANGE_PX, Target};
 use crate::view::{Metric, Tolerance};
@@ -276,8 +278,8 @@ pub fn save_regions(folder: &Path) -> Result<Vec<Picture>> {
         let colour = |x: u32, y: u32| shade(cells[((ROWS - 1 - y / CELL) * COLUMNS + x / CELL) as usize]);
         let file = format!("stability-{name}.png");
         let path = folder.join(&file);
-        RgbImage::from_fn(COLUMNS * CELL, ROWS * CELL, colour)
-            .save(&path)
+        let picture = RgbImage::from_fn(COLUMNS * CELL, ROWS * CELL, colour);
+        replace(&path, |out| picture.write_to(out, ImageFormat::Png).map_err(io::Error::other))
             .with_context(|| path.display().to_string())?;
         let stable = cells.iter().filter(|settled| settled.is_some()).count();
         let caption = format!(

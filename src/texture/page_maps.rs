@@ -112,12 +112,15 @@ impl PageMaps {
         (0..side).flat_map(|j| &of.texels[row(j)..row(j) + side]).copied().collect()
     }
 
-    /// The level whose texels are at most a pixel: the coarsest such, or the finest of all.
+    /// As many texels as a page's finest map has, of a coarser level: those of 2^level × 2^level pages, from the `at`-th such
+    /// square on along each axis. Beyond the last page its last texels go on.
     ///
-    /// `page_m` is the length of a page's side, `pixel_m` that of a pixel where the page is nearest.
-    pub fn level_for(&self, page_m: f64, pixel_m: f64) -> u32 {
-        let coarser = (0..self.levels()).take_while(|&level| page_m / f64::from(self.cells(level)) <= pixel_m);
-        coarser.last().unwrap_or(0)
+    /// # Panics
+    /// If there is no such level.
+    pub fn tile(&self, level: u32, at: [u32; 2]) -> Vec<Texel> {
+        let (of, cells) = (&self.levels[level as usize], self.cells(0));
+        let along = |k: usize| (0..=cells).map(move |n| (at[k] * cells + n).min(of.size[k] - 1) as usize);
+        along(1).flat_map(|z| along(0).map(move |x| of.texels[z * of.size[0] as usize + x])).collect()
     }
 }
 
@@ -259,6 +262,34 @@ mod tests {
         }
     }
 
+    /// A square of pages is their coarser maps side by side; those beside each other end in the same texels.
+    #[test]
+    fn a_tile_is_the_maps_of_its_pages() {
+        let maps = maps([61, 37], whole([4, 3], false));
+        let side = maps.side(0);
+        for level in 0..3u32 {
+            let cells = maps.cells(level);
+            for (x, z) in (0..4 >> level).flat_map(|x| (0..3u32.div_ceil(1 << level)).map(move |z| (x, z))) {
+                let tile = maps.tile(level, [x, z]);
+                for page in (0..4u32 << (2 * level) >> 2).map(|k| [k % (1 << level), k >> level]) {
+                    let at = [(x << level) + page[0], (z << level) + page[1]];
+                    if at[1] >= 3 {
+                        continue;
+                    }
+                    let map = maps.cut(Map { page: at, level });
+                    let of_tile = |n: usize| {
+                        let (i, j) = (n as u32 % (cells + 1), n as u32 / (cells + 1));
+                        tile[((page[1] * cells + j) * side + page[0] * cells + i) as usize]
+                    };
+                    assert!((0..map.len()).all(|n| of_tile(n) == map[n]), "page {at:?} at level {level}");
+                }
+                if level < 2 && x + 1 < 4 >> level {
+                    assert_eq!(column(&tile, side, side - 1), column(&maps.tile(level, [x + 1, z]), side, 0));
+                }
+            }
+        }
+    }
+
     /// What filtering each page by itself does at its edges would show here.
     #[test]
     fn a_bright_texel_reaches_the_page_beside_it() {
@@ -284,17 +315,6 @@ mod tests {
             let maps = PageMaps::new(Picture { size: [50, 31], texels: &texels }, layout);
             let all = maps.levels.iter().flat_map(|level| &level.texels);
             assert!(all.into_iter().all(|texel| *texel == texels[0]));
-        }
-    }
-
-    #[test]
-    fn a_texel_is_at_most_a_pixel() {
-        let maps = maps([64, 64], whole([4, 4], false));
-        let texel_m = |level| 160.0 / f64::from(maps.cells(level));
-        for pixel_m in [1e-9, 0.5, 9.9, 10.0, 25.0, 39.9, 40.0, 159.0, 1e9] {
-            let level = maps.level_for(160.0, pixel_m);
-            assert!(level == 0 || texel_m(level) <= pixel_m);
-            assert!(level + 1 == maps.levels() || texel_m(level + 1) > pixel_m, "level {level} for {pixel_m} m");
         }
     }
 }

@@ -84,11 +84,13 @@ impl Slots {
         }
     }
 
-    /// Begins a frame: gives slots to what was made meanwhile. Nodes for which there is none are forgotten, and asked for
-    /// again if they are still needed.
-    pub fn begin(&mut self) -> Vec<Fill> {
+    /// Begins a frame: gives slots to what was made meanwhile, to `most` nodes at the most, large ones first. Nodes for which
+    /// there is none are forgotten, and asked for again if they are still needed.
+    pub fn begin(&mut self, most: usize) -> Vec<Fill> {
         let mut made = std::mem::take(&mut self.arrived);
         made.extend(self.made.try_iter());
+        made.sort_unstable_by_key(|(node, _)| *node);
+        self.arrived = made.split_off(most.min(made.len()));
         let mut oldest = self.unused(made.len());
         for (node, texels) in made {
             self.coming.remove(&node);
@@ -171,7 +173,7 @@ mod tests {
         let mut last: HashSet<u32> = HashSet::new();
         for _ in 0..frames {
             place = place.map(|n| (n + dice.i32(-1..=1)).clamp(0, 240));
-            for Fill { slot, texels } in slots.begin() {
+            for Fill { slot, texels } in slots.begin(usize::MAX) {
                 assert!(!last.contains(&slot), "slot {slot} served in the last frame");
                 device[slot as usize] = texels;
             }
@@ -196,6 +198,27 @@ mod tests {
     fn nodes_are_served_by_themselves_or_by_one_around_them() {
         let (exact, coarse) = wander(128, 300);
         assert!(exact > 3 * coarse && coarse > 40, "{exact} served, {coarse} by coarser ones");
+    }
+
+    /// What was made is filled in over several frames, the large nodes first, and nothing is lost.
+    #[test]
+    fn so_many_are_filled_in_a_frame() {
+        let mut slots = Slots::new(64, Arc::new(label));
+        let nodes: Vec<_> = (1..4).flat_map(|level| (0..5).map(move |x| Node { level, at: [x, 0] })).collect();
+        let frame = |slots: &mut Slots, most| {
+            let fills = slots.begin(most);
+            for node in &nodes {
+                slots.serve(*node);
+            }
+            slots.finish();
+            slots.wait();
+            fills
+        };
+        assert_eq!(frame(&mut slots, 4).len(), 1, "the root");
+        let levels: Vec<u8> = (0..4).flat_map(|_| frame(&mut slots, 4)).map(|fill| fill.texels[0][0]).collect();
+        assert_eq!(levels, [1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3]);
+        assert_eq!(slots.waiting(), 0);
+        assert!(frame(&mut slots, 4).is_empty());
     }
 
     #[test]

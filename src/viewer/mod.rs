@@ -53,6 +53,8 @@ pub struct Setup {
     pub seconds: Option<f64>,
     /// Writes a screenshot.
     pub save: fn(&Path, &image::RgbaImage) -> Result<()>,
+    /// Takes what is to be done when the user interrupts the program.
+    pub on_interrupt: fn(Box<dyn FnOnce() + Send>),
 }
 
 /// How a session went.
@@ -76,10 +78,9 @@ pub fn run(setup: &Setup) -> Result<Summary> {
     // The window system's own words name its source files, and nothing that helps.
     let event_loop = event_loop.map_err(|_| anyhow!("no window: the display cannot be reached"))?;
     let proxy = event_loop.create_proxy();
-    // A second handler in one process is refused; then Ctrl-C ends the process as it always did.
-    let _ = ctrlc::set_handler(move || {
+    (setup.on_interrupt)(Box::new(move || {
         let _ = proxy.send_event(Stop);
-    });
+    }));
     let mut app = App::new(setup);
     event_loop.run_app(&mut app).context("the window system")?;
     app.into_summary()

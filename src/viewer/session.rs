@@ -208,7 +208,7 @@ impl Session {
         let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
         let frozen = if self.frozen { ", frozen" } else { "" };
         let wire = if self.look.wireframe { ", edges" } else { "" };
-        vec![
+        let mut rows = vec![
             row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
             row("select", format!("{:.2} ms", self.select.get())),
             row("gpu", format!("{:.1} ms", self.gpu.get())),
@@ -223,7 +223,9 @@ impl Session {
             row("camera", format!("{}, {}", self.camera.mode_name(), speed_text(self.camera.speed(&setup.field)))),
             row("position", format!("{x:.0} {y:.0} {z:.0} m")),
             row("above ground", format!("{:.1} m", self.camera.above_ground(&setup.field))),
-        ]
+        ];
+        rows.extend(figures.maps.map(|maps| row("texture maps", maps.to_string())));
+        rows
     }
 }
 
@@ -241,7 +243,8 @@ pub fn free_path() -> PathBuf {
 fn next_colour(colour: Colour, has_overlay: bool) -> Colour {
     match colour {
         Colour::Height if has_overlay => Colour::Overlay,
-        Colour::Height | Colour::Overlay => Colour::Level,
+        Colour::Overlay => Colour::Maps,
+        Colour::Height | Colour::Maps => Colour::Level,
         Colour::Level => Colour::Error,
         Colour::Error => Colour::Normal,
         Colour::Normal => Colour::Batch,
@@ -253,6 +256,7 @@ fn colour_name(colour: Colour) -> &'static str {
     match colour {
         Colour::Height => "height",
         Colour::Overlay => "overlay",
+        Colour::Maps => "maps",
         Colour::Level => "level",
         Colour::Error => "error",
         Colour::Normal => "normal",
@@ -282,7 +286,7 @@ mod tests {
             while seen.len() < 10 && (seen.len() == 1 || seen.last() != Some(&Colour::Height)) {
                 seen.push(next_colour(seen[seen.len() - 1], has_overlay));
             }
-            assert_eq!(seen.len(), 6 + usize::from(has_overlay));
+            assert_eq!(seen.len(), 6 + 2 * usize::from(has_overlay));
             assert_eq!(seen.contains(&Colour::Overlay), has_overlay);
         }
     }

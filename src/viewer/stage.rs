@@ -15,6 +15,7 @@ use crate::gpu::terrain::Terrain;
 use crate::gpu::{Gpu, Instance, target};
 use crate::lod::{Entry, Settings, Technique};
 use crate::plan::{Look, ScenePlan};
+use crate::texture::picture_maps;
 use crate::view::View;
 
 /// Device, window target, terrain and technique.
@@ -48,6 +49,8 @@ pub struct Figures {
     pub widening: f64,
     /// Error allowed, pixels.
     pub tolerance_px: f64,
+    /// The maps of the picture laid over, where it is there in parts.
+    pub maps: Option<picture_maps::Figures>,
 }
 
 /// What a frame shows.
@@ -70,8 +73,10 @@ pub struct Shown {
 
 /// What the scene needs.
 fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Result<ScenePlan> {
-    let plan = ScenePlan::new(&setup.field, look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
-    Ok(plan.with_manner(technique.manner()))
+    let (limits, picture) = (gpu.device_limits(), setup.overlay.as_ref().map(|picture| picture.dimensions().into()));
+    let plan = ScenePlan::new(&setup.field, look, &limits).map_err(anyhow::Error::msg)?;
+    let plan = plan.with_overlay(&setup.field, look, &limits, picture).map_err(anyhow::Error::msg)?;
+    Ok(ScenePlan { windowed: true, ..plan.with_manner(technique.manner()) })
 }
 
 impl Stage {
@@ -162,6 +167,8 @@ impl Stage {
         let mut overlay = overlay(&self.figures);
         self.hud.update(std::mem::take(&mut overlay.textures))?;
         let started = Instant::now();
+        self.terrain.overlay.look(&mut recording, shot.view)?;
+        self.figures.maps = self.terrain.overlay.figures();
         let frame = shot.look.frame(&setup.field, shot.view, self.range);
         self.terrain.prepare(&mut recording, &frame, &self.list)?;
         self.terrain.select(&mut recording, &self.list)?;

@@ -64,6 +64,14 @@ fn violations(file: &str, text: &str) -> Vec<String> {
             }
         }
     }
+    // What tests say goes to whoever runs them.
+    let of_program =
+        if file.ends_with("tests.rs") { "" } else { code.split("#[cfg(test)]").next().unwrap_or_default() };
+    for (line, text) in of_program.lines().enumerate() {
+        if text.contains("print!(") || text.contains("println!(") {
+            found.push(format!("src/{file}:{}: a print panics where nobody reads: cli::report says it", line + 1));
+        }
+    }
     found.dedup();
     found
 }
@@ -131,6 +139,7 @@ fn made_up_violations_are_found() {
         ("cellar/mod.rs", "use crate::view::View;", "module cellar has no row in the table of arrows"),
         ("lod/mod.rs", "unsafe { *p }", "`unsafe` outside gpu"),
         ("measure/mod.rs", "use ash::vk;", "`ash` outside gpu"),
+        ("view.rs", "fn f() { eprintln!(\"x\") }", "a print panics where nobody reads: cli::report says it"),
     ];
     for (file, line, what) in cases {
         let text = format!("//! Made up.\n\n{line}\n");
@@ -152,6 +161,7 @@ fn what_is_allowed_is_not_reported() {
         ("lod/mod.rs", "pub mod geomipmap;\nconst T: &[Entry] = &[geomipmap::ENTRY];"),
         ("view.rs", "// crate::gpu is unsafe, as ash is.\n\nconst S: &str = \"hash, unsafely\";"),
         ("view.rs", "mod tests {\n    use super::*;\n}"),
+        ("view.rs", "#[cfg(test)]\nmod tests {\n    fn f() { println!(\"x\") }\n}"),
         ("lib.rs", "pub mod view;\n\npub mod lod;"),
     ];
     for (file, text) in cases {

@@ -20,6 +20,8 @@ fn what_needs_samples_refuses_it_by_name() {
     let export = ["export", "endless", "-o", "a.ply", "--technique", "clusters"];
     refused(folder.path(), &[&export[..], &eye].concat(), &["clusters", "samples", "sphere-tree"]);
     refused(folder.path(), &["info", "endless", "--spacing", "2"], &["endless", "samples"]);
+    let by_error = ["info", "endless", "--plan", "--technique", "sphere-tree", "--colour", "error"];
+    refused(folder.path(), &by_error, &["--colour error", "endless", "samples"]);
     refused(folder.path(), &["info", "endless:stone"], &["endless:stone", "seed"]);
     refused(folder.path(), &["bench", "endless", "--out", "run"], &["bench", "every sample"]);
 }

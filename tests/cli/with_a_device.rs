@@ -280,3 +280,138 @@ fn a_loaded_renderdoc_captures_the_slowest_mode() {
     assert!(printed["capture"]["mode"].as_str().unwrap().starts_with("geomipmap"));
     assert_eq!(std::fs::read_to_string(at.join("calls")).unwrap(), "start\nend\n");
 }
+
+/// What is drawn is the old picture or the new one; what was measured stays, and the same command goes on.
+#[test]
+fn a_device_that_is_lost_is_told_and_takes_nothing_with_it() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let at = folder.path();
+    synth(at, "fractal", "65x65", "land.tif");
+    std::fs::write(at.join("p.png"), "old").unwrap();
+    let picture = ["render", "land.tif", "-o", "p.png", "--size", "64x36", "--lose-device"];
+    for calls in ["0", "3", "7"] {
+        refused(at, &[&picture[..], &[calls]].concat(), &["the device is lost"]);
+        assert_eq!(std::fs::read(at.join("p.png")).unwrap(), b"old");
+    }
+    assert_eq!(code(&cuesta(at, &[&picture[..], &["100000"]].concat())), 0);
+    image::open(at.join("p.png")).expect("a picture");
+    let bench = ["bench", "land.tif", "--out", "b", "--technique", "geomipmap", "--tolerance", "2", "--size", "64x36"];
+    let bench = [&bench[..], &["--frames", "4", "--rounds", "2"]].concat();
+    refused(at, &[&bench[..], &["--lose-device", "40"]].concat(), &["the device is lost", "rows are kept"]);
+    let lines = || std::fs::read_to_string(at.join("b/rows.jsonl")).unwrap().lines().count();
+    assert!(lines() >= 1 && lines() < 4, "{} lines", lines());
+    assert_eq!(json(at, &bench)["rows"].as_u64(), Some(3));
+    let stress = ["stress", "--case", "flat", "--technique", "brute-force", "--lose-device", "5", "--json"];
+    let output = cuesta(at, &stress);
+    let told: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
+    assert!(code(&output) == 1 && told["ended"].as_str().unwrap().contains("the device is lost"), "{told}");
+    let failed = told["cases"].as_array().unwrap().iter().filter(|case| case["pass"] == false);
+    assert_eq!(failed.count(), 1, "the loss is told once, and what was found without a device stays: {told}");
+}
+
+/// The first Ctrl-C ends a benchmark after the row at hand, and a picture at once.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_rows_and_pictures() {
+    use super::robust::interrupted_when;
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let at = folder.path();
+    synth(at, "fractal", "129x129", "land.tif");
+    let bench = ["bench", "land.tif", "--out", "b", "--technique", "geomipmap,clusters", "--tolerance", "1,2,4"];
+    let bench = [&bench[..], &["--size", "96x54", "--frames", "8", "--rounds", "3"]].concat();
+    let lines = || std::fs::read_to_string(at.join("b/rows.jsonl")).map_or(0, |text| text.lines().count());
+    let mut stops = 0;
+    for kept in [1, 3, 8, 14] {
+        let least = kept.max(lines());
+        let (output, was_running) = interrupted_when(at, &bench, || lines() > least);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(code(&output), 0, "{said}");
+        assert!(at.join("b/index.html").is_file() && lines() > kept);
+        stops += u32::from(was_running && said.contains("the same command goes on"));
+    }
+    assert!(stops >= 2, "{stops} runs were stopped");
+    let done = json(at, &bench);
+    assert_eq!((done["rows"].as_u64(), done["complete"].as_bool(), lines()), (Some(24), Some(true), 25));
+    let start = |text: &str| std::fs::write(at.join("p.png"), text).unwrap();
+    let picture = ["render", "land.tif", "-o", "p.png", "--size", "320x200", "--repeat", "20"];
+    for ms in [0, 30, 60, 100, 150, 250, 400, 700] {
+        start("old");
+        let begun = std::time::Instant::now();
+        let (output, _) = interrupted_when(at, &picture, || begun.elapsed().as_millis() >= ms);
+        let is_old = std::fs::read(at.join("p.png")).unwrap() == b"old";
+        let is_stopped = output.status.code().is_none_or(|code| code == 2);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(is_stopped || code(&output) == 0, "{ms} ms: {:?} {said}", output.status);
+        assert!(is_old || image::open(at.join("p.png")).is_ok_and(|p| p.width() == 320), "{ms} ms");
+        assert!(is_stopped || !is_old, "{ms} ms");
+    }
+    let beside = std::fs::read_dir(at).unwrap().count();
+    assert_eq!(beside, 3, "land.tif, p.png and b, and nothing else");
+}
+
+/// A loader that finds no driver, and one that finds the same twice.
+#[test]
+fn drivers_that_are_missing_or_there_twice_are_told() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let at = folder.path();
+    let with_drivers = |files: &str, arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+        command.env("VK_DRIVER_FILES", files).env("VK_ICD_FILENAMES", files).env("VK_LOADER_DRIVERS_DISABLE", "");
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+        command.args(arguments).current_dir(at).output().expect("the program starts")
+    };
+    for arguments in
+        [&["render", "demo", "-o", "p.png"][..], &["bench", "demo", "--out", "b"], &[], &["info", "--devices"]]
+    {
+        let output = with_drivers("/nowhere/at/all.json", arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(code(&output), 2, "{arguments:?}: {said}");
+        assert!(
+            said.lines().last().is_some_and(|line| line.starts_with("error: ") && line.contains("Vulkan")),
+            "{said}"
+        );
+    }
+    let stress = ["stress", "--case", "flat", "--technique", "brute-force"];
+    let output = with_drivers("/nowhere/at/all.json", &stress);
+    assert!(
+        code(&output) == 0 && String::from_utf8_lossy(&output.stderr).contains("no pictures"),
+        "no device is needed"
+    );
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let file = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let Some(file) = file.map(|entry| entry.path()).find(|path| path.to_string_lossy().contains("lvp")) else {
+        println!("skipped: no driver of which there could be two");
+        return;
+    };
+    std::fs::copy(&file, at.join("again.json")).unwrap();
+    let both = format!("{}:{}", file.display(), at.join("again.json").display());
+    let output = with_drivers(&both, &["info", "--devices", "--json"]);
+    let told: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
+    assert_eq!(told["devices"].as_array().unwrap().len(), 2, "{told}");
+    for device in ["cpu", "llvmpipe"] {
+        let arguments =
+            ["render", "demo", "-o", "p.png", "--size", "64x36", "--device", device, "--validate", "--json"];
+        assert_eq!(code(&with_drivers(&both, &arguments)), 0, "{device}");
+    }
+}
+
+/// A display that nobody serves, and none at all.
+#[cfg(feature = "viewer")]
+#[test]
+fn without_a_display_the_window_says_so() {
+    let folder = folder();
+    refused(folder.path(), &["view", "demo"], &["no display"]);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
+    let output = command.args(["view", "demo"]).env("DISPLAY", ":4711").env_remove("WAYLAND_DISPLAY").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(code(&output) == 2 && said.starts_with("error: no window") && said.lines().count() == 1, "{said}");
+}

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
 use cuesta::draw::{
-    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Seams, Source, Topology, skirts,
+    Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Seams, Source, Topology, skirts,
 };
 use cuesta::height::Field;
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
@@ -176,7 +176,7 @@ impl Technique for Changed {
         (self.change)(list);
     }
     fn manner(&self) -> Manner {
-        Manner { seams: self.seams, ..Manner::default() }
+        Manner { draws: self.inner.manner().draws, seams: self.seams, ..Manner::default() }
     }
     fn keeps_tolerance(&self) -> bool {
         true
@@ -220,6 +220,9 @@ fn streamed(field: &Arc<Field>, change: fn(&mut Geometry)) -> Box<dyn Technique>
 }
 
 impl Technique for Streamed {
+    fn manner(&self) -> Manner {
+        Manner { draws: Draws::EXPLICIT, ..Manner::default() }
+    }
     fn resident(&self) -> &Geometry {
         &self.nothing
     }

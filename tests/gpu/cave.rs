@@ -79,7 +79,7 @@ fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
         for (k, view) in flight(&field, 8, 1.0).iter().enumerate() {
             let shot = scene.shoot(technique.as_mut(), view, 1).unwrap();
             let truth = Truth::new(&scene, view).unwrap();
-            assert_eq!(truth.hole_pixels(view, &shot.picture), [0; 0], "frame {k}");
+            assert_eq!(truth.hole_pixels(&scene, view, &shot.picture).unwrap(), [0; 0], "frame {k}");
             // The way ends at the field's rim, where the cave is open.
             let closed = share(&shot.picture, |[_, _, _, a]| a > 0);
             println!("frame {k}: {closed:.3} of the pixels are rock; eye {:?}, forward {:?}", view.eye, view.forward());

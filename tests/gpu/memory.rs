@@ -13,7 +13,7 @@ use cuesta::scene::{Copy, Scene};
 use super::{aslant, on_device, technique};
 
 /// Draws a picture.
-fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
+pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
         let mut stage = scene.stage(technique, view.size)?;
@@ -23,7 +23,7 @@ fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> R
 }
 
 /// Measures a picture with everything that has device memory of its own: floor, capture, oracle, probe, truth.
-fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
+pub fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
         let mut stage = scene.stage(technique, view.size)?;
@@ -48,7 +48,7 @@ fn with_scene(
     work(&Scene { gpu, field, plan: &plan, look: &look, overlay: None }, technique)
 }
 
-type Work = fn(&Arc<Gpu>, &Arc<Field>, &mut dyn Technique) -> Result<()>;
+pub type Work = fn(&Arc<Gpu>, &Arc<Field>, &mut dyn Technique) -> Result<()>;
 
 /// Fails the first allocation, then the second, until none is left to fail; how many there are.
 fn fail_each(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work) -> u64 {

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use cuesta::draw::{
-    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Submission, Topology, Upload,
-    VertexNormals, normals,
+    Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Submission, Topology,
+    Upload, VertexNormals, normals,
 };
 use cuesta::height::{Field, rtin};
 use cuesta::lod::Technique;
@@ -137,7 +137,8 @@ impl Technique for Explicit {
 
     fn manner(&self) -> Manner {
         let normals = if self.way.is_lit() { Normals::Vertices } else { Normals::Texture };
-        Manner { normals, ..Manner::default() }
+        let draws = Draws { triangles: self.way != Way::Strips, strips: self.way == Way::Strips, ..Draws::EXPLICIT };
+        Manner { draws, normals, ..Manner::default() }
     }
 }
 

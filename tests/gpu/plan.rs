@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use cuesta::draw::{Manner, Morph};
 use cuesta::height::Field;
-use cuesta::plan::{Colour, DeviceLimits, Look, ScenePlan};
+use cuesta::plan::{Colour, DeviceLimits, FEATURES, Forced, Look, ScenePlan};
+use cuesta::scene::{Scene, savings};
 
 use super::{as_f32, aslant, difference, mountains, on_device, shoot_planned, technique};
 
@@ -42,6 +43,78 @@ fn forced_features_show_the_same_picture() {
         assert!(difference(&shoot(&field, &unfiltered), &lean, 3).1 < 0.01, "filtering in the shader");
         let paged = ScenePlan { page_shift: 5, ..unfiltered.clone() };
         assert_eq!(shoot(&field, &paged), shoot(&field, &unfiltered), "pages");
+    });
+}
+
+/// Every technique, every feature that its scene leaves out: kept by hand it takes what the plan says, and the picture
+/// is the same wherever the scene cannot tell.
+#[test]
+fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
+    on_device(|gpu| {
+        let field = without_holes();
+        let view = aslant(&field, [160, 120], 1.0);
+        let look = Look { colour: Colour::Normal, ..Look::default() };
+        let mut kept_in_some = std::collections::BTreeSet::new();
+        for (name, settings) in [
+            ("brute-force", &[][..]),
+            ("geomipmap", &["block=17"]),
+            ("smooth-tiles", &[]),
+            ("sorted-strips", &["order=painter"]),
+            ("sphere-tree", &[]),
+            ("clusters", &["block=8"]),
+        ] {
+            let mut techniques = [technique(&field, name, settings), technique(&field, name, settings)];
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let plan = plan.with_manner(techniques[0].manner());
+            let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            let (lean, savings) = savings::measure(&scene, &mut techniques, &view, 1).unwrap();
+            assert!(lean.bytes > 0 && lean.pipelines > 1 && lean.instructions > 100, "{name}: {lean:?}");
+            for saving in savings {
+                println!("{name}: {saving:?}");
+                let texels = field.samples().len() as i64;
+                let least_bytes = match saving.feature {
+                    "32-bit heights" => 2 * texels,
+                    "hole mask" => texels - 1,
+                    "depth buffer" => 4 * 160 * 120,
+                    "detail textures" => 1 << 20,
+                    _ => 0,
+                };
+                assert!(saving.bytes >= least_bytes, "{name}: {saving:?}");
+                let adds_programs =
+                    ["lattice program", "explicit program", "triangle strips"].contains(&saving.feature);
+                assert_eq!(saving.pipelines > 0, adds_programs, "{name}: {saving:?}");
+                let in_all = ["hole mask", "fog", "filtering in the shader"].contains(&saving.feature);
+                let of_lattice = ["tiling", "vertex weights"].contains(&saving.feature) && plan.draws.lattice;
+                assert!(saving.instructions > 0 || !(in_all || of_lattice), "{name}: {saving:?}");
+                let is_rounded =
+                    ["32-bit heights", "height pages", "filtering in the shader"].contains(&saving.feature);
+                let (largest, pixels) = saving.differs;
+                assert!(largest <= if is_rounded { 8 } else { 0 }, "{name}: {saving:?}");
+                assert!(pixels <= 160 * 120 / if is_rounded { 2 } else { 1 }, "{name}: {saving:?}");
+                kept_in_some.insert(saving.feature);
+            }
+        }
+        // Nothing is measured in a scene that leaves queries out; all others are left out in some scene above.
+        let forcible = FEATURES.iter().filter(|f| f.can_be(true) && f.name != "queries").map(|f| f.name);
+        assert!(forcible.clone().all(|name| kept_in_some.contains(name)), "{kept_in_some:?}");
+        assert_eq!(kept_in_some.len(), forcible.count());
+    });
+}
+
+#[test]
+fn what_is_left_out_by_hand_is_not_there() {
+    on_device(|gpu| {
+        let field = without_holes();
+        let view = aslant(&field, [96, 64], 1.0);
+        let forced = Forced::default().with("fog", false).unwrap();
+        let [plain, foggy, without] = [(0.0, Forced::default()), (3e-4, Forced::default()), (3e-4, forced)]
+            .map(|(fog, forced)| Look { fog, forced, ..Look::default() })
+            .map(|look| {
+                let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+                let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+                scene.shoot(technique(&field, "geomipmap", &["block=17"]).as_mut(), &view, 1).unwrap().picture
+            });
+        assert!(plain != foggy && plain == without);
     });
 }
 

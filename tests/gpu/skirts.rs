@@ -52,7 +52,7 @@ fn hole_pixels(gpu: &Arc<Gpu>, field: &Arc<Field>, view: &View, picture: &image:
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
-    Truth::new(&scene, view).unwrap().hole_pixels(view, picture).len()
+    Truth::new(&scene, view).unwrap().hole_pixels(&scene, view, picture).unwrap().len()
 }
 
 fn count(picture: &image::RgbaImage) -> usize {
@@ -101,7 +101,7 @@ fn no_hole_pixels_on_any_field_of_the_laws() {
                 let mut stage = Scene { plan: &plan, ..scene.clone() }.stage(&technique, [320, 180]).unwrap();
                 for (what, view, truth) in &truths {
                     stage.draw(&mut technique, view, Copy::Picture).unwrap();
-                    let open = truth.hole_pixels(view, &stage.picture()).len();
+                    let open = truth.hole_pixels(&scene, view, &stage.picture()).unwrap().len();
                     assert_eq!(open, 0, "{name}, {what}, {morph}");
                     seen += count(&stage.picture());
                 }

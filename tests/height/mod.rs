@@ -5,5 +5,5 @@ mod malformed;
 mod options;
 mod place;
 mod real;
-mod tiff_file;
-mod tiny;
+pub mod tiff_file;
+pub mod tiny;

@@ -7,6 +7,7 @@ mod endless;
 mod morph;
 mod skirts;
 mod smooth_tiles;
+mod spared;
 mod sphere_tree;
 mod strips;
 mod strips_cave;

@@ -156,8 +156,14 @@ fn a_battery_is_read_again_as_it_was_written_and_drawn_as_a_page() {
         row("gaps", None, Some(0.0), false),
         row("loads", Some(5.0), None, true),
     ];
-    let stress =
-        Stress { schema: SCHEMA, program: "cuesta".to_string(), device: None, cases: rows, pictures: Vec::new() };
+    let stress = Stress {
+        schema: SCHEMA,
+        program: "cuesta".to_string(),
+        device: None,
+        ended: None,
+        cases: rows,
+        pictures: Vec::new(),
+    };
     assert_eq!(stress.counts(), [1, 1]);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(FILE), serde_json::to_vec(&stress).unwrap()).unwrap();

@@ -76,6 +76,12 @@ impl Blocks {
         &self.errors[block * levels..(block + 1) * levels]
     }
 
+    /// The finest level that any block needs whatever the tolerance: the coarsest at which all of them are exact.
+    pub fn finest(&self) -> u32 {
+        let exact = |errors: &[f32]| errors.iter().skip(1).take_while(|&&error| error == 0.0).count() as u32;
+        self.errors.chunks(self.levels as usize).map(exact).min().unwrap_or(0)
+    }
+
     /// The box around a block; a block without land has one of no height.
     pub fn bounds(&self, block: usize) -> Aabb {
         let (i, j) = (block as u32 % self.count[0], block as u32 / self.count[0]);

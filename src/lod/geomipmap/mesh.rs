@@ -75,8 +75,13 @@ pub struct BlockMesh {
 }
 
 impl BlockMesh {
-    /// A block of `cells` (a power of two) cells a side with log2(cells) + 1 levels.
+    /// A block of `cells` (a power of two) cells a side with log2(cells) + 1 levels, all of them used.
     pub fn new(cells: i32, masks: Masks) -> Self {
+        Self::used(cells, masks, 0, false)
+    }
+
+    /// The same without indices for levels finer than `finest` and, if the block is `alone`, for sides that meet others.
+    pub fn used(cells: i32, masks: Masks, finest: u32, alone: bool) -> Self {
         let levels = cells.ilog2() + 1;
         let positions = (0..=cells).flat_map(|z| (0..=cells).map(move |x| [x, z]));
         let lattice = positions.map(|position| LatticeVertex { position }).collect();
@@ -87,10 +92,13 @@ impl BlockMesh {
             indices.extend(triangles.into_iter().flatten().map(index));
             first..indices.len() as u32
         };
-        let borders = (0..levels)
-            .map(|level| masks.list().iter().map(|&mask| append(level, border(cells >> level, mask))).collect())
-            .collect();
-        let centres = (0..levels).map(|level| append(level, centre(cells >> level))).collect();
+        let mut append = |level: u32, is_used: bool, triangles: fn(i32, u8) -> Vec<[[i32; 2]; 3]>, mask: u8| {
+            append(level, if is_used && level >= finest { triangles(cells >> level, mask) } else { Vec::new() })
+        };
+        let mut borders =
+            |level| masks.list().into_iter().map(|mask| append(level, !alone || mask == 0, border, mask)).collect();
+        let borders = (0..levels).map(&mut borders).collect();
+        let centres = (0..levels).map(|level| append(level, true, |n, _| centre(n), 0)).collect();
         Self { geometry: Geometry { lattice, indices, ..Geometry::default() }, borders, centres }
     }
 }

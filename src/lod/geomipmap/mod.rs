@@ -27,7 +27,7 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use super::{Entry, Setting, Settings, Spared, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Morph, Source, Submission, Topology, weights};
 use crate::height::Field;
 use crate::view::View;
@@ -82,6 +82,8 @@ pub const ENTRY: Entry = Entry {
 struct GeoMipMap {
     blocks: Blocks,
     mesh: BlockMesh,
+    /// The finest level that is ever drawn.
+    finest: u32,
     masks: Masks,
     distance: Distance,
     morph: bool,
@@ -101,15 +103,19 @@ impl GeoMipMap {
         let base = settings.number("base") * field.spacing[0].max(field.spacing[1]);
         let masks = if settings.word("masks") == "16" { Masks::Sixteen } else { Masks::Six };
         let bytes = |masks| size_of_val(BlockMesh::new(cells, masks).geometry.indices.as_slice());
+        let distance = match settings.word("distance") {
+            "linear" => Distance::Linear(base),
+            "exponential" => Distance::Exponential(base),
+            _ => Distance::Error,
+        };
+        let blocks = Blocks::new(field, cells, morph, &settings.progress);
+        let finest = if distance == Distance::Error { blocks.finest() } else { 0 };
         Self {
-            blocks: Blocks::new(field, cells, morph, &settings.progress),
-            mesh: BlockMesh::new(cells, masks),
+            mesh: BlockMesh::used(cells, masks, finest, blocks.count == [1, 1]),
+            finest,
+            blocks,
             masks,
-            distance: match settings.word("distance") {
-                "linear" => Distance::Linear(base),
-                "exponential" => Distance::Exponential(base),
-                _ => Distance::Error,
-            },
+            distance,
             morph,
             draw_per_block: settings.variant() == Some("draw-per-block"),
             index_bytes: [bytes(Masks::Six), bytes(Masks::Sixteen)],
@@ -262,6 +268,26 @@ impl Technique for GeoMipMap {
 
     fn manner(&self) -> Manner {
         Manner { morph: if self.morph { Morph::ByInstance } else { Morph::No }, ..Manner::default() }
+    }
+
+    fn spared(&self) -> Vec<Spared> {
+        let indices = |finest: u32, alone: bool| {
+            let mesh = BlockMesh::used(self.blocks.cells, self.masks, finest, alone);
+            size_of_val(mesh.geometry.indices.as_slice()) as u64
+        };
+        let mut spared = Vec::new();
+        if self.finest > 0 {
+            let reason = format!("every block is exact at level {}", self.finest);
+            let bytes = indices(0, false) - indices(self.finest, false);
+            spared.push(Spared { what: "indices of finer levels", reason, bytes });
+        }
+        if self.blocks.count == [1, 1] {
+            let reason = "one block holds the field".to_string();
+            let bytes = indices(self.finest, false) - indices(self.finest, true);
+            spared.push(Spared { what: "indices of stitched borders", reason: reason.clone(), bytes });
+            spared.push(Spared { what: "quadtree", reason, bytes: 0 });
+        }
+        spared
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

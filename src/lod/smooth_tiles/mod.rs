@@ -41,9 +41,9 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Setting, Settings, Technique, Values};
+use super::{Entry, Setting, Settings, Spared, Technique, Values};
 use crate::draw::{
-    Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
+    Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
     VertexNormals, weights,
 };
 use crate::height::Field;
@@ -161,7 +161,7 @@ impl SmoothTiles {
         let queue = Queue::new(&tiles, (settings.number("memory") * 1048576.0) as usize / vertex);
         let chunks = settings.number("rebuild") as usize;
         let vertices = queue.vertices().min(UPLOAD_BYTES / vertex);
-        let patterns = Patterns::new(cells);
+        let patterns = Patterns::new(cells, tiles.finest(), tiles.total() == 1);
         let side_m = f64::from(cells) * field.spacing[0].max(field.spacing[1]);
         let (top, count) = (tiles.levels - 1, tiles.total());
         let mut room = Self {
@@ -338,7 +338,26 @@ impl Technique for SmoothTiles {
 
     fn manner(&self) -> Manner {
         let normals = if self.has_normals { Normals::Vertices } else { Normals::Texture };
-        Manner { normals, ..Manner::default() }
+        Manner { draws: Draws::EXPLICIT, normals, ..Manner::default() }
+    }
+
+    fn spared(&self) -> Vec<Spared> {
+        let indices = |finest: u32, alone: bool| {
+            size_of_val(Patterns::new(self.tiles.cells, finest, alone).indices.as_slice()) as u64
+        };
+        let (finest, is_alone) = (self.tiles.finest(), self.tiles.total() == 1);
+        let mut spared = Vec::new();
+        if finest > 0 {
+            let reason = format!("every tile is exact at level {finest}");
+            let bytes = indices(0, false) - indices(finest, false);
+            spared.push(Spared { what: "indices of finer levels", reason, bytes });
+        }
+        if is_alone {
+            let reason = "one tile holds the field".to_string();
+            let bytes = indices(finest, false) - indices(finest, true);
+            spared.push(Spared { what: "indices of stitched borders", reason, bytes });
+        }
+        spared
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
@@ -350,8 +369,9 @@ impl Technique for SmoothTiles {
             ("vertex bytes in use", bytes(self.queue.used_vertices()), "B"),
             ("index bytes", size_of_val(self.patterns.indices.as_slice()) as f64, "B"),
         ];
+        let all = Patterns::new(self.tiles.cells, 0, false);
         let reduction = |(level, name): (u32, &'static str)| {
-            let share = f64::from(self.patterns.triangles(level)) / f64::from(self.patterns.triangles(0));
+            let share = f64::from(all.triangles(level)) / f64::from(all.triangles(0));
             (name, 100.0 * (1.0 - share), "%")
         };
         whole.into_iter().chain((1..self.tiles.levels).zip(REDUCTIONS).map(reduction)).collect()

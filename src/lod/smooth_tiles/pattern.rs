@@ -23,17 +23,25 @@ pub struct Patterns {
 }
 
 impl Patterns {
-    /// Of tiles of so many cells a side, a power of two.
-    pub fn new(cells: i32) -> Self {
+    /// Of tiles of so many cells a side, a power of two, without indices for levels finer than `finest` and, if the tile
+    /// is `alone`, for sides that meet others.
+    pub fn new(cells: i32, finest: u32, alone: bool) -> Self {
         let mut patterns = Self { indices: Vec::new(), centres: Vec::new(), borders: Vec::new() };
         for level in 0..=cells.ilog2() {
             let n = cells >> level;
+            if level < finest {
+                patterns.centres.push(0..0);
+                patterns.borders.push(std::array::from_fn(|_| 0..0));
+                continue;
+            }
             let centre = patterns.append(n, &centre(n));
             patterns.centres.push(centre);
             let borders = std::array::from_fn(|mask| {
                 // A single cell has no vertex between its corners: the bit tells the diagonal.
                 let triangles = if n == 1 {
                     rtin::cell(mask as i32 & 1, 0).map(|t| unshifted(t, mask)).into()
+                } else if alone && mask > 0 {
+                    Vec::new()
                 } else {
                     border(n, mask)
                 };
@@ -119,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_level_has_the_published_number_of_triangles() {
-        let patterns = Patterns::new(32);
+        let patterns = Patterns::new(32, 0, false);
         for (level, percent) in [(0, 0.0), (1, 75.0), (2, 93.75), (3, 98.44), (4, 99.61)] {
             let triangles = patterns.triangles(level);
             assert_eq!(triangles, 1 << (2 * (5 - level) + 1), "2^(2(w − l) + 1)");

@@ -47,8 +47,8 @@ impl Queue {
         let all_at = |levels: &[u32]| -> Vec<usize> {
             (0..tiles.levels).map(|level| if levels.contains(&level) { count } else { 0 }).collect()
         };
-        // All of the finest level, twice, so that all may change in one frame; the coarsest at least.
-        let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[0, top]));
+        // All of the finest level that is used, twice, so that all may change in one frame; the coarsest at least.
+        let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
         let least = Pool::vertices_for(&sizes, &all_at(&[top])) + Pool::vertices_for(&sizes, &all_at(&[]));
         let mut pool = Pool::new(sizes, whole.min(most_vertices).max(least));
         let first_vertices =

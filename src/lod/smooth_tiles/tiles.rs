@@ -61,6 +61,12 @@ impl Tiles {
         &self.errors[tile * levels..(tile + 1) * levels]
     }
 
+    /// The finest level that any tile needs whatever the tolerance: the coarsest at which all of them are exact.
+    pub fn finest(&self) -> u32 {
+        let exact = |tile| self.errors(tile).iter().skip(1).take_while(|&&error| error == 0.0).count() as u32;
+        (0..self.total()).map(exact).min().unwrap_or(0)
+    }
+
     /// Where a tile lies.
     pub fn place(&self, tile: usize) -> Place {
         place(self.cells, self.count, tile)

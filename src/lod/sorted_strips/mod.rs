@@ -63,7 +63,7 @@ use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Source, Topology};
+use crate::draw::{Draw, DrawList, Draws, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, View};
@@ -299,7 +299,7 @@ impl Technique for SortedStrips {
     }
 
     fn manner(&self) -> Manner {
-        Manner { hiding: self.sequence.hiding(), ..Manner::default() }
+        Manner { draws: Draws::EXPLICIT, hiding: self.sequence.hiding(), ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -41,8 +41,8 @@ impl Hasher for IndexHasher {
         self.0
     }
 
-    fn write(&mut self, _bytes: &[u8]) {
-        unreachable!("keys are u64")
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(self.0 ^ u64::from(byte)));
     }
 
     fn write_u64(&mut self, key: u64) {

@@ -45,7 +45,7 @@ use self::roam::Queues;
 use self::shells::Shells;
 use self::splits::{Found, Splits};
 use super::{Entry, Setting, Settings, Technique, Values, widened};
-use crate::draw::{DrawList, Geometry, Limits, Manner, Normals};
+use crate::draw::{DrawList, Draws, Geometry, Limits, Manner, Normals};
 use crate::height::Field;
 use crate::view::View;
 
@@ -199,7 +199,7 @@ impl Technique for SphereTree {
 
     fn manner(&self) -> Manner {
         let normals = if self.measured.is_endless() { Normals::Vertices } else { Normals::Texture };
-        Manner { normals, ..Manner::default() }
+        Manner { draws: Draws::EXPLICIT, normals, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -82,8 +82,9 @@ impl Watch for Shells {
         while let Some(&Reverse((_, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.way) {
             self.queue.pop();
             *visited += 1;
-            let nest = &mut self.nests[number as usize];
-            while nest.slack(from.eye).is_some_and(|slack| slack <= 0.0) {
+            let (nest, way) = (&mut self.nests[number as usize], self.way);
+            // A slack that is nothing beside the way cannot be waited for.
+            while nest.slack(from.eye).is_some_and(|slack| way + slack <= way) {
                 tickets.extend(nest.shells.pop().map(|(_, ticket)| ticket));
             }
             self.await_innermost(number, from.eye);
@@ -93,5 +94,37 @@ impl Watch for Shells {
     fn place(&mut self, front: &mut Front, ticket: Ticket, _known: &Known, _is_split: bool, slack: f64) {
         (self.eye, self.current.centre) = (front.from.eye, front.from.eye);
         self.current.shells.push((slack.to_bits(), ticket));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lod::sphere_tree::reach::Reach;
+    use crate::view::{Lens, Metric, Tolerance, View};
+
+    /// After a long way, a shell is left that is nearer than the way's next number: it is not waited for for ever.
+    #[test]
+    fn a_slack_that_is_nothing_beside_the_way_is_due() {
+        let view = View {
+            eye: DVec3::ZERO,
+            world_from_eye: View::turned(0.0, 0.0, 0.0),
+            lens: Lens::Perspective { fov_x: 1.0 },
+            size: [64, 64],
+            near: 0.1,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
+        };
+        let from = |eye: DVec3| Viewpoint { eye, reach: Reach::new(&view), band: 1.0, hold: 1.0 };
+        let mut shells = Shells { way: 1e9, ..Shells::default() };
+        let ticket = |index| Ticket { index, number: index as u32 };
+        shells.current.shells = vec![(5.0f64.to_bits(), ticket(1)), (1e-9f64.to_bits(), ticket(2))];
+        let (mut tickets, mut visited) = (Vec::new(), 0);
+        shells.due(&from(DVec3::ZERO), &mut tickets, &mut visited);
+        assert_eq!((tickets.as_slice(), visited), (&[ticket(2)][..], 1));
+        shells.due(&from(DVec3::new(4.0, 0.0, 0.0)), &mut tickets, &mut visited);
+        assert_eq!(tickets.len(), 1, "the other one is a metre away");
+        shells.due(&from(DVec3::new(5.1, 0.0, 0.0)), &mut tickets, &mut visited);
+        assert_eq!(tickets, [ticket(2), ticket(1)]);
     }
 }

@@ -1,0 +1,157 @@
+//! `cuesta info --plan`: what a scene needs on the device, what it leaves out, and what that saves.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+#[cfg(not(feature = "vulkan"))]
+use anyhow::bail;
+use serde::Serialize;
+
+use super::info::InfoArgs;
+use super::{Common, Outcome, report};
+use crate::height::Field;
+use crate::lod::Technique;
+use crate::plan::{Decision, Look, ScenePlan};
+
+/// What a scene keeps and leaves out, and what its technique prepared.
+#[derive(Serialize)]
+struct Plan {
+    technique: &'static str,
+    kept: Vec<Decision>,
+    left_out: Vec<LeftOut>,
+    /// What the technique did not prepare for this field.
+    spared: Vec<Unprepared>,
+    figures: Vec<Figure>,
+    /// All that is kept, measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    whole: Option<Whole>,
+}
+
+#[derive(Serialize)]
+struct LeftOut {
+    feature: &'static str,
+    reason: String,
+    /// Device bytes; where it was measured, as measured.
+    bytes_saved: i64,
+    #[serde(flatten)]
+    measured: Option<Saved>,
+}
+
+#[derive(Serialize)]
+struct Unprepared {
+    what: &'static str,
+    reason: String,
+    bytes_saved: u64,
+}
+
+/// What the feature would take beside the bytes.
+#[derive(Serialize)]
+struct Saved {
+    pipelines_saved: i64,
+    instructions_saved: i64,
+    /// The device's time for a frame with it, as a ratio to that without.
+    time_with: f64,
+    /// Pixels that differ with it, and by how much at most, of 255.
+    pixels_changed: usize,
+    largest_change: u8,
+}
+
+#[derive(Serialize)]
+struct Whole {
+    bytes: i64,
+    pipelines: i64,
+    instructions: i64,
+    gpu_ms: f64,
+}
+
+#[derive(Serialize)]
+struct Figure {
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+}
+
+/// Runs the subcommand for a field that was read.
+pub fn run(common: &Common, args: &InfoArgs, terrain: &str, field: &Arc<Field>) -> Result<Outcome> {
+    let (look, overlay) = args.look.build(terrain)?;
+    let (entry, _) = args.technique.settings()?;
+    let technique = args.technique.build(common, field)?;
+    let (plan, savings) = plan(common, args, (field, &look, overlay.as_ref()), technique.as_ref())?;
+    let (kept, left_out) = plan.decisions(field, Some(&technique.kept()));
+    let (whole, mut savings) = savings.unzip();
+    let mut left_out: Vec<_> = left_out.into_iter().map(LeftOut::from).collect();
+    for (feature, bytes, saved) in savings.take().into_iter().flatten() {
+        if let Some(decision) = left_out.iter_mut().find(|decision| decision.feature == feature) {
+            (decision.bytes_saved, decision.measured) = (bytes, Some(saved));
+        }
+    }
+    let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
+    let spared = technique.spared().into_iter();
+    let spared = spared.map(|s| Unprepared { what: s.what, reason: s.reason, bytes_saved: s.bytes }).collect();
+    report::print(common, &Plan { technique: entry.name, kept, left_out, spared, figures, whole })?;
+    Ok(Outcome::Done)
+}
+
+impl From<Decision> for LeftOut {
+    fn from(Decision { feature, reason, bytes }: Decision) -> Self {
+        Self { feature, reason, bytes_saved: bytes as i64, measured: None }
+    }
+}
+
+/// Field, look, and the picture laid over.
+type Scenery<'a> = (&'a Arc<Field>, &'a Look, Option<&'a image::RgbaImage>);
+
+/// All that is kept, and for each feature that is left out what it would take.
+type Measured = (Whole, Vec<(&'static str, i64, Saved)>);
+
+#[cfg(feature = "vulkan")]
+fn plan(
+    common: &Common,
+    args: &InfoArgs,
+    (field, look, overlay): Scenery,
+    technique: &dyn Technique,
+) -> Result<(ScenePlan, Option<Measured>)> {
+    use crate::scene::{Scene, savings};
+
+    let gpu = super::render::open(common, false)?;
+    let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
+    let plan = ScenePlan::new(field, look, &limits).map_err(anyhow::Error::msg)?;
+    let plan = plan.with_overlay(field, look, &limits, picture).map_err(anyhow::Error::msg)?;
+    let plan = plan.with_manner(technique.manner());
+    let Some(frames) = args.measure else {
+        return Ok((plan, None));
+    };
+    let view = args.view.build(field, args.technique.tolerance()?)?;
+    let mut techniques = [args.technique.build(common, field)?, args.technique.build(common, field)?];
+    let scene = Scene { gpu: &gpu, field, plan: &plan, look, overlay };
+    let (lean, savings) = savings::measure(&scene, &mut techniques, &view, frames)?;
+    let whole =
+        Whole { bytes: lean.bytes, pipelines: lean.pipelines, instructions: lean.instructions, gpu_ms: lean.gpu_ms };
+    let saved = |s: savings::Saving| {
+        let (largest_change, pixels_changed) = s.differs;
+        let (pipelines_saved, instructions_saved, time_with) = (s.pipelines, s.instructions, s.time);
+        let saved = Saved { pipelines_saved, instructions_saved, time_with, pixels_changed, largest_change };
+        (s.feature, s.bytes, saved)
+    };
+    Ok((plan, Some((whole, savings.into_iter().map(saved).collect()))))
+}
+
+/// Without Vulkan, plans are made for what every desktop device has.
+#[cfg(not(feature = "vulkan"))]
+fn plan(
+    _: &Common,
+    args: &InfoArgs,
+    (field, look, overlay): Scenery,
+    technique: &dyn Technique,
+) -> Result<(ScenePlan, Option<Measured>)> {
+    use crate::plan::DeviceLimits;
+
+    if args.measure.is_some() {
+        bail!("--measure: this build is without Vulkan");
+    }
+    let device = DeviceLimits { image_side: 16384, image_layers: 2048, filters_heights: true };
+    let plan = ScenePlan::new(field, look, &device).map_err(anyhow::Error::msg)?;
+    let picture = overlay.map(|picture| picture.dimensions().into());
+    let plan = plan.with_overlay(field, look, &device, picture).map_err(anyhow::Error::msg)?;
+    Ok((plan.with_manner(technique.manner()), None))
+}

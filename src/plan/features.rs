@@ -1,0 +1,344 @@
+//! The features of a plan: when each is kept and why, what it takes, and how it is forced.
+
+use super::look::Colour;
+use super::{Decision, ScenePlan};
+use crate::draw::layout::{ExplicitVertex, VertexNormals};
+use crate::draw::{Geometry, Hiding, Kept, Limits, Morph, Normals, Seams};
+use crate::height::Field;
+use crate::texture::detail;
+
+/// One feature.
+pub struct Feature {
+    /// Its name.
+    pub name: &'static str,
+    is_kept: fn(&ScenePlan, &Kept) -> bool,
+    /// Why it is kept.
+    kept: &'static str,
+    /// Why it is left out.
+    left_out: &'static str,
+    /// Whether it is the technique that needs it, not the scene.
+    by_technique: bool,
+    /// Device bytes that it takes.
+    bytes: fn(&ScenePlan, &Kept) -> u64,
+    /// How it is kept or left out by hand.
+    pub(super) force: Force,
+}
+
+/// How a feature is kept or left out by hand.
+pub(super) enum Force {
+    /// Not at all: why.
+    Never(&'static str),
+    /// It can be kept where nothing needs it.
+    In(fn(&mut ScenePlan)),
+    /// It can be left out too; the picture may change then.
+    Either(fn(&mut ScenePlan, bool)),
+}
+
+/// All features, in the order of reports.
+pub const FEATURES: &[Feature] = &[
+    Feature {
+        name: "32-bit heights",
+        is_kept: |plan, _| !plan.coded,
+        kept: "heights do not fit 16 bits",
+        left_out: "heights are exact in 16 bits",
+        by_technique: false,
+        bytes: |plan, _| 2 * plan.samples(),
+        force: Force::In(|plan| plan.coded = false),
+    },
+    Feature {
+        name: "hole mask",
+        is_kept: |plan, _| plan.holes,
+        kept: "samples without data",
+        left_out: "every sample has data",
+        by_technique: false,
+        bytes: |plan, _| plan.samples(),
+        force: Force::In(|plan| plan.holes = true),
+    },
+    Feature {
+        name: "ceiling",
+        is_kept: |plan, _| plan.ceiling,
+        kept: "the field is the floor of a cave",
+        left_out: "nothing lies over the field",
+        by_technique: false,
+        bytes: |plan, _| plan.texel_bytes() * plan.samples(),
+        force: Force::Never("it is read with --ceiling"),
+    },
+    Feature {
+        name: "tiling",
+        is_kept: |plan, _| plan.tiled,
+        kept: "the field repeats",
+        left_out: "the field does not repeat",
+        by_technique: false,
+        bytes: none,
+        force: Force::In(|plan| plan.tiled = true),
+    },
+    Feature {
+        name: "height pages",
+        is_kept: |plan, _| plan.page_shift > 0,
+        kept: "the field exceeds one image",
+        left_out: "one image holds the field",
+        by_technique: false,
+        bytes: none,
+        force: Force::In(ScenePlan::cut_into_pages),
+    },
+    Feature {
+        name: "filtering in the shader",
+        is_kept: |plan, _| !plan.filtered,
+        kept: "the device's sampler cannot: the heights' format, or several pages",
+        left_out: "the device's sampler does it",
+        by_technique: false,
+        bytes: none,
+        force: Force::In(|plan| plan.filtered = false),
+    },
+    Feature {
+        name: "lattice program",
+        is_kept: |plan, _| plan.draws.lattice,
+        kept: "vertices get their heights from the texture",
+        left_out: "vertices come with their heights",
+        by_technique: true,
+        bytes: none,
+        force: Force::In(|plan| plan.draws.lattice = true),
+    },
+    Feature {
+        name: "explicit program",
+        is_kept: |plan, _| plan.draws.explicit,
+        kept: "vertices come with their heights",
+        left_out: "vertices get their heights from the texture",
+        by_technique: true,
+        bytes: none,
+        force: Force::In(|plan| plan.draws.explicit = true),
+    },
+    Feature {
+        name: "triangle strips",
+        is_kept: |plan, _| plan.draws.strips,
+        kept: "some draws are strips",
+        left_out: "no draw is a strip",
+        by_technique: true,
+        bytes: none,
+        force: Force::In(|plan| plan.draws.strips = true),
+    },
+    Feature {
+        name: "vertex weights",
+        is_kept: |plan, _| plan.manner.morph != Morph::No,
+        kept: "lattice vertices morph or fall onto coarser sides",
+        left_out: "no lattice vertex moves",
+        by_technique: true,
+        bytes: none,
+        force: Force::In(|plan| {
+            if plan.manner.morph == Morph::No {
+                plan.manner.morph = Morph::ByInstance;
+            }
+        }),
+    },
+    Feature {
+        name: "skirts",
+        is_kept: |plan, _| plan.manner.seams == Seams::Skirts,
+        kept: "meshes have edges of their own",
+        left_out: "meshes share their edges",
+        by_technique: true,
+        bytes: none,
+        force: Force::Never("meshes have them or not: a setting of the technique"),
+    },
+    Feature {
+        name: "vertex normals",
+        is_kept: |plan, _| plan.manner.normals == Normals::Vertices,
+        kept: "vertices carry what lights them",
+        left_out: "the height texture lights each pixel",
+        by_technique: true,
+        bytes: |_, kept| (kept.geometry.normals.len() * size_of::<VertexNormals>()) as u64,
+        force: Force::Never("vertices have them or not: a setting of the technique"),
+    },
+    Feature {
+        name: "streamed geometry",
+        is_kept: |_, kept| kept.limits.vertices > 0,
+        kept: "every frame has vertices of its own",
+        left_out: "what is drawn stays on the device",
+        by_technique: true,
+        bytes: |_, kept| {
+            let limits = kept.limits;
+            let [vertex, normal] = [size_of::<ExplicitVertex>(), size_of::<VertexNormals>()];
+            (limits.vertices * vertex + limits.normals * normal + limits.indices * size_of::<u32>()) as u64
+        },
+        force: Force::Never("it is what the technique draws"),
+    },
+    Feature {
+        name: "uploads",
+        is_kept: |_, kept| kept.limits.upload_bytes > 0,
+        kept: "what stays on the device changes from frame to frame",
+        left_out: "what stays on the device does not change",
+        by_technique: true,
+        bytes: |_, kept| kept.limits.upload_bytes as u64,
+        force: Force::Never("it is what the technique draws"),
+    },
+    Feature {
+        name: "selection on the device",
+        is_kept: |_, kept| kept.driver.is_some(),
+        kept: "the technique leaves it to the device",
+        left_out: "the host selects",
+        by_technique: true,
+        bytes: none,
+        force: Force::Never("it is a variant of the technique"),
+    },
+    Feature {
+        name: "depth buffer",
+        is_kept: |plan, _| plan.has_depth(),
+        kept: "triangles come in any order",
+        left_out: "the furthest come first",
+        by_technique: true,
+        bytes: none,
+        force: Force::In(|plan| plan.manner.hiding = Hiding::ByDepth),
+    },
+    Feature {
+        name: "fog",
+        is_kept: |plan, _| plan.fog,
+        kept: "asked for",
+        left_out: "density 0",
+        by_technique: false,
+        bytes: none,
+        force: Force::Either(|plan, keep| plan.fog = keep),
+    },
+    Feature {
+        name: "detail textures",
+        is_kept: |plan, _| plan.detail,
+        kept: "asked for",
+        left_out: "the ground is not looked at from near",
+        by_technique: false,
+        bytes: |_, _| detail::bytes(),
+        force: Force::Either(|plan, keep| plan.detail = keep),
+    },
+    Feature {
+        name: "overlay",
+        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_none(),
+        kept: "asked for",
+        left_out: "no picture is laid over as a whole",
+        by_technique: false,
+        bytes: |plan, _| plan.overlay.map_or(0, overlay_bytes),
+        force: Force::Never("a picture is laid over with --overlay"),
+    },
+    Feature {
+        name: "texture maps",
+        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_some(),
+        kept: "the picture exceeds the memory for it, or one image",
+        left_out: "no picture exceeds the memory for it",
+        by_technique: false,
+        bytes: |plan, _| plan.maps.map_or(0, |cut| cut.bytes()),
+        force: Force::Never("it is the memory for a picture that decides: --texture-memory"),
+    },
+    Feature {
+        name: "wireframe",
+        is_kept: |plan, _| plan.wireframe,
+        kept: "asked for",
+        left_out: "faces are filled",
+        by_technique: false,
+        bytes: none,
+        force: Force::Never("it is asked for with --wireframe"),
+    },
+    Feature {
+        name: "swapchain",
+        is_kept: |plan, _| plan.windowed,
+        kept: "pictures go to a window",
+        left_out: "pictures stay in memory",
+        by_technique: false,
+        bytes: none,
+        force: Force::Never("only view opens a window"),
+    },
+    Feature {
+        name: "queries",
+        is_kept: |plan, _| plan.measured,
+        kept: "times are reported",
+        left_out: "nothing is measured",
+        by_technique: false,
+        bytes: none,
+        force: Force::Either(|plan, keep| plan.measured = keep),
+    },
+];
+
+/// Bytes of a picture of so many texels.
+pub(super) fn overlay_bytes(size: [u32; 2]) -> u64 {
+    4 * u64::from(size[0]) * u64::from(size[1])
+}
+
+fn none(_: &ScenePlan, _: &Kept) -> u64 {
+    0
+}
+
+impl Feature {
+    /// Whether it can be kept, or left out, by hand.
+    pub fn can_be(&self, kept: bool) -> bool {
+        match self.force {
+            Force::Never(_) => false,
+            Force::In(_) => kept,
+            Force::Either(_) => true,
+        }
+    }
+
+    /// Keeps it in a plan, or leaves it out, if that can be.
+    pub(super) fn force(&self, plan: &mut ScenePlan, keep: bool) {
+        match self.force {
+            Force::Either(force) => force(plan, keep),
+            Force::In(force) if keep => force(plan),
+            _ => {}
+        }
+    }
+
+    fn decide(&self, plan: &ScenePlan, field: &Field, kept: &Kept) -> (bool, Decision) {
+        let is_kept = (self.is_kept)(plan, kept);
+        let reason = match (plan.forced.has(self), is_kept, self.name) {
+            (true, true, _) => "kept by hand".to_string(),
+            (true, false, _) => "left out by hand".to_string(),
+            (_, true, "hole mask") => format!("{} {}", field.holes().count(), self.kept),
+            (_, true, _) => self.kept.to_string(),
+            (_, false, _) => self.left_out.to_string(),
+        };
+        (is_kept, Decision { feature: self.name, reason, bytes: (self.bytes)(plan, kept) })
+    }
+}
+
+impl ScenePlan {
+    fn shows_picture(&self) -> bool {
+        matches!(self.colour, Colour::Overlay | Colour::Maps)
+    }
+
+    /// What is kept and what is left out, in that order, for a technique that keeps this on the device; without one
+    /// only what the scene decides.
+    pub fn decisions(&self, field: &Field, technique: Option<&Kept>) -> (Vec<Decision>, Vec<Decision>) {
+        let nothing = Kept { geometry: &Geometry::default(), limits: Limits::default(), driver: None };
+        let kept = technique.unwrap_or(&nothing);
+        let known = FEATURES.iter().filter(|feature| technique.is_some() || !feature.by_technique);
+        let all = known.map(|feature| feature.decide(self, field, kept));
+        let (keep, leave): (Vec<_>, Vec<_>) = all.partition(|(is_kept, _)| *is_kept);
+        let decisions = |part: Vec<(bool, Decision)>| part.into_iter().map(|(_, decision)| decision).collect();
+        (decisions(keep), decisions(leave))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+    use crate::plan::{DeviceLimits, Look};
+
+    /// A picture is there as a whole where that fits, in parts where it does not, and either says why.
+    #[test]
+    fn a_picture_is_there_once() {
+        let field = Field::new(Samples::F32(vec![0.0; 65 * 65]), [65, 65], [1.0; 2], Holes::none(65 * 65));
+        let device = DeviceLimits { image_side: 4096, image_layers: 256, filters_heights: true };
+        let reasons = |size: Option<[u32; 2]>, texture_bytes: u64| {
+            let look = Look { colour: Colour::Overlay, texture_bytes, ..Look::default() };
+            let plan = ScenePlan::new(&field, &look, &device).unwrap();
+            let plan = plan.with_overlay(&field, &look, &device, size)?;
+            let (kept, left_out) = plan.decisions(&field, None);
+            let is_of_picture = |d: &&Decision| ["overlay", "texture maps"].contains(&d.feature);
+            assert_eq!(kept.iter().chain(&left_out).filter(is_of_picture).count(), 2);
+            let kept: Vec<_> = kept.into_iter().filter(|d| is_of_picture(&d)).map(|d| (d.feature, d.bytes)).collect();
+            let reason = left_out.iter().find(is_of_picture).map(|d| d.reason.clone());
+            Ok::<_, String>((kept, reason.unwrap_or_default()))
+        };
+        let whole = reasons(Some([2048, 1024]), 8 << 20).unwrap();
+        assert_eq!(whole, (vec![("overlay", 8 << 20)], "no picture exceeds the memory for it".to_string()));
+        let (kept, reason) = reasons(Some([2048, 1024]), (8 << 20) - 1).unwrap();
+        assert!(kept[0].0 == "texture maps" && kept[0].1 < 8 << 20 && reason.contains("as a whole"), "{reason}");
+        assert_eq!(reasons(Some([8192, 16]), 1 << 30).unwrap().0[0].0, "texture maps", "beyond one image");
+        assert!(reasons(Some([2048, 1024]), 99_999).unwrap_err().contains("expected at least"));
+    }
+}

@@ -1,0 +1,76 @@
+//! Features that are kept or left out by hand, to see what they cost.
+
+use super::features::{FEATURES, Feature, Force};
+
+/// Which features are forced; nothing by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Forced {
+    /// Bit k: feature k of [`FEATURES`] is kept.
+    kept: u32,
+    /// Bit k: it is left out.
+    left_out: u32,
+}
+
+/// A feature's name as it is written on the command line.
+pub fn word(feature: &Feature) -> String {
+    feature.name.replace(' ', "-")
+}
+
+impl Forced {
+    /// The same with one feature more, by its [`word`], that is kept or left out; or why not.
+    pub fn with(self, name: &str, keep: bool) -> Result<Self, String> {
+        let Some(k) = FEATURES.iter().position(|feature| word(feature) == name) else {
+            let known: Vec<_> = FEATURES.iter().filter(|f| f.can_be(true) || f.can_be(false)).map(word).collect();
+            return Err(format!("{name}: no such feature: try {}", known.join(", ")));
+        };
+        let feature = &FEATURES[k];
+        if !feature.can_be(keep) {
+            let why = match feature.force {
+                Force::Never(why) => why,
+                _ => "what needs it would not be drawn right",
+            };
+            let how = if keep { "kept" } else { "left out" };
+            return Err(format!("{name}: it cannot be {how} by hand: {why}"));
+        }
+        let bit = 1 << k;
+        if (self.kept | self.left_out) & bit != 0 {
+            return Err(format!("{name}: forced twice"));
+        }
+        Ok(if keep { Self { kept: self.kept | bit, ..self } } else { Self { left_out: self.left_out | bit, ..self } })
+    }
+
+    /// Each forced feature, and whether it is kept.
+    pub(super) fn each(self) -> impl Iterator<Item = (&'static Feature, bool)> {
+        let is = |bits: u32, k: usize| bits >> k & 1 == 1;
+        let state = move |k: usize| if is(self.kept, k) { Some(true) } else { is(self.left_out, k).then_some(false) };
+        FEATURES.iter().enumerate().filter_map(move |(k, feature)| Some((feature, state(k)?)))
+    }
+
+    /// Whether this feature is.
+    pub(super) fn has(self, feature: &Feature) -> bool {
+        self.each().any(|(forced, _)| forced.name == feature.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_are_forced_by_name_once_and_only_where_that_makes_sense() {
+        assert!(FEATURES.len() <= 32, "a bit each");
+        let fog = Forced::default().with("fog", true).unwrap();
+        assert_eq!(fog.each().map(|(f, keep)| (f.name, keep)).collect::<Vec<_>>(), [("fog", true)]);
+        assert!(fog.with("fog", false).unwrap_err().contains("forced twice"));
+        let both = fog.with("queries", false).unwrap();
+        assert_eq!(both.each().count(), 2);
+        for (name, keep, expected) in [
+            ("frog", true, "32-bit-heights"),
+            ("ceiling", true, "--ceiling"),
+            ("hole-mask", false, "cannot be left out"),
+        ] {
+            let refused = Forced::default().with(name, keep).unwrap_err();
+            assert!(refused.contains(name) && refused.contains(expected), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! What a scene needs, and therefore what is left out: worked out before anything is made on the device, and
+//! everything on the device is made from it alone.
+
+pub mod features;
+pub mod forced;
+mod look;
+
+use crate::draw::{Draws, Hiding, Manner};
+use crate::height::{Field, Samples};
+use crate::texture::picture_maps::Cut;
+pub use features::{FEATURES, Feature};
+pub use forced::Forced;
+pub use look::{Colour, Look};
+
+/// What the device allows, as far as the plan depends on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DeviceLimits {
+    /// Largest side of a 2D image.
+    pub image_side: u32,
+    /// Most layers of an image.
+    pub image_layers: u32,
+    /// Whether height textures can be filtered linearly.
+    pub filters_heights: bool,
+}
+
+/// The features of one scene's pipelines and resources.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenePlan {
+    /// 16-bit heights stay 16-bit.
+    pub coded: bool,
+    /// The field repeats.
+    pub tiled: bool,
+    /// Some samples have no data.
+    pub holes: bool,
+    /// A ceiling lies over the field: its heights are there, and a lamp at the eye lights both.
+    pub ceiling: bool,
+    /// Fog is computed.
+    pub fog: bool,
+    /// What colours say; `Overlay` keeps a picture.
+    pub colour: Colour,
+    /// Edges only.
+    pub wireframe: bool,
+    /// Side of a page of the height texture as a power of two; 0: one page holds the whole field.
+    pub page_shift: u32,
+    /// Normals filter heights with the device's sampler.
+    pub filtered: bool,
+    /// What the technique's lists ask for.
+    pub manner: Manner,
+    /// The draws that there are programs for.
+    pub draws: Draws,
+    /// The ground's materials are there, and looked up.
+    pub detail: bool,
+    /// Timestamps and pipeline statistics are taken.
+    pub measured: bool,
+    /// Pictures go to a window.
+    pub windowed: bool,
+    /// Samples stored along (x, z).
+    pub stored: [u32; 2],
+    /// Texels of the picture that may be laid over (x, z).
+    pub overlay: Option<[u32; 2]>,
+    /// How it is cut where it is there in parts.
+    pub maps: Option<Cut>,
+    /// What was kept and left out by hand.
+    pub forced: Forced,
+}
+
+/// One feature of a plan and what became of it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Decision {
+    /// What it is.
+    pub feature: &'static str,
+    /// Why it is kept or left out.
+    pub reason: String,
+    /// Device bytes that leaving it out saves, or that it takes.
+    pub bytes: u64,
+}
+
+impl ScenePlan {
+    /// The plan for a field and a look, or which limit of the device the field exceeds.
+    pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
+        let (stored, is_endless) = (field.stored(), field.land().is_some());
+        let page_shift = if stored.iter().all(|&n| n <= device.image_side) { 0 } else { device.image_side.ilog2() };
+        let mut plan = Self {
+            coded: matches!(field.samples(), Samples::Coded { .. }),
+            tiled: field.is_tiled(),
+            holes: field.holes().count() > 0,
+            ceiling: field.ceiling().is_some(),
+            fog: look.fog > 0.0,
+            // Without samples there is nothing to be compared with.
+            colour: if is_endless && look.colour == Colour::Error { Colour::Height } else { look.colour },
+            wireframe: look.wireframe,
+            page_shift,
+            filtered: device.filters_heights && page_shift == 0,
+            manner: Manner::default(),
+            draws: Manner::default().draws,
+            detail: look.detail,
+            measured: true,
+            windowed: false,
+            stored,
+            overlay: None,
+            maps: None,
+            forced: look.forced,
+        };
+        plan.force();
+        let layers = plan.pages()[0] * plan.pages()[1];
+        if layers > device.image_layers {
+            return Err(format!(
+                "{} x {} samples need {layers} pages of {}²: maxImageArrayLayers is {}",
+                stored[0],
+                stored[1],
+                plan.page_size()[0],
+                device.image_layers
+            ));
+        }
+        Ok(plan)
+    }
+
+    /// The plan for a technique whose lists ask for this.
+    pub fn with_manner(self, manner: Manner) -> Self {
+        let mut plan = Self { manner, draws: manner.draws, ..self };
+        plan.force();
+        plan
+    }
+
+    fn force(&mut self) {
+        for (feature, keep) in self.forced.each() {
+            feature.force(self, keep);
+        }
+    }
+
+    /// The same plan with one feature kept whether it is needed or not, by its [`word`](forced::word); or why that
+    /// cannot be.
+    pub fn keeping(&self, name: &str) -> Result<Self, String> {
+        let mut plan = self.clone();
+        for (feature, keep) in Forced::default().with(name, true)?.each() {
+            feature.force(&mut plan, keep);
+        }
+        Ok(plan)
+    }
+
+    /// Heights in several pages although one would hold them, half as long as the longer side or shorter.
+    fn cut_into_pages(&mut self) {
+        let longest = self.stored[0].max(self.stored[1]).max(4);
+        if self.page_shift == 0 {
+            self.page_shift = (longest - 1).ilog2();
+            self.filtered = false;
+        }
+    }
+
+    /// The plan with a picture of so many texels laid over the field: in parts where it exceeds the look's bytes or one
+    /// image, and the field has samples.
+    ///
+    /// # Errors
+    /// If the bytes do not hold the few parts that there must be.
+    pub fn with_overlay(
+        mut self,
+        field: &Field,
+        look: &Look,
+        device: &DeviceLimits,
+        overlay: Option<[u32; 2]>,
+    ) -> Result<Self, String> {
+        self.overlay = overlay;
+        let is_whole = |size: &[u32; 2]| {
+            features::overlay_bytes(*size) <= look.texture_bytes && size.iter().all(|&n| n <= device.image_side)
+        };
+        if let Some(size) = overlay.filter(|size| field.land().is_none() && !is_whole(size)) {
+            let last = field.size().map(|n| n - 1);
+            self.maps = Some(Cut::new(last, size, look.texture_bytes, device.image_layers)?);
+        }
+        Ok(self)
+    }
+
+    /// Whether pictures need a depth buffer.
+    pub fn has_depth(&self) -> bool {
+        self.manner.hiding == Hiding::ByDepth
+    }
+
+    /// Texels of a page of the height texture (x, z).
+    pub fn page_size(&self) -> [u32; 2] {
+        if self.page_shift == 0 { self.stored } else { [1 << self.page_shift; 2] }
+    }
+
+    /// Pages of the height texture along (x, z).
+    pub fn pages(&self) -> [u32; 2] {
+        let page = self.page_size();
+        [0, 1].map(|k| self.stored[k].div_ceil(page[k]))
+    }
+
+    /// Bytes of a stored height.
+    pub fn texel_bytes(&self) -> u64 {
+        if self.coded { 2 } else { 4 }
+    }
+
+    fn samples(&self) -> u64 {
+        u64::from(self.stored[0]) * u64::from(self.stored[1])
+    }
+}

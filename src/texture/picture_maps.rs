@@ -1,0 +1,401 @@
+//! A picture laid over a field that is larger than the memory for it: which of its maps a view needs, which of them are
+//! there, and which one each page is drawn with.
+//!
+//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8: each page takes the coarsest map whose
+//! texels are at most a pixel where the page is nearest; what is there is drawn at once, and finer maps are made on workers
+//! meanwhile ([`Slots`]). Where the paper has maps of many sizes, a coarser map here is a tile of the same size over twice
+//! as many pages along each axis: the same texels, and any slot takes any tile. A page's table entry says which slot, and
+//! how many pages the tile in it is long.
+
+use std::fmt;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::page_maps::{Layout, PageMaps, Picture};
+use super::slots::{Fill, Slots};
+use super::working_set::Node;
+use crate::height::Field;
+use crate::height::bounds::{Bounds, Measure};
+use crate::height::progress::Progress;
+use crate::view::{Aabb, Containment, Frustum, Lens, View};
+
+/// How a picture is cut, and how much of it is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// Samples along a side of a page, as a power of two.
+    pub page_shift: u32,
+    /// Pages along (x, z).
+    pub pages: [u32; 2],
+    /// Cells between the texels along a side of a tile: a power of two.
+    pub cells: u32,
+    /// A tile of the root is 2^depth pages long.
+    pub depth: u32,
+    /// Tiles kept.
+    pub slots: u32,
+}
+
+/// The least cells along a side of a tile.
+const LEAST_CELLS: u32 = 128;
+/// The most: those of [`PageMaps`].
+const MOST_CELLS: u32 = 4096;
+/// The least samples along a side of a page, as a power of two: those of [`Bounds`].
+const LEAST_SHIFT: u32 = 3;
+/// Tiles that serve for others of a frame: the root, and one that gives way to what it stands in for.
+const SPARE: u32 = 2;
+/// The least tiles kept: a root with all four in it.
+const LEAST_SLOTS: u64 = 5 + SPARE as u64;
+
+impl Cut {
+    /// Cuts a picture of so many texels over a field that ends with sample `last`, for a number of bytes and at most
+    /// `most_slots` tiles.
+    ///
+    /// # Errors
+    /// If the bytes do not hold the few tiles that there must be.
+    pub fn new(last: [u32; 2], picture: [u32; 2], budget_bytes: u64, most_slots: u32) -> Result<Self, String> {
+        let cut = |cells: u32| {
+            let texels_a_sample = (0..2).map(|k| f64::from(picture[k]) / f64::from(last[k].max(1))).fold(0.0, f64::max);
+            let shift = (f64::from(cells) / texels_a_sample).log2().floor().clamp(f64::from(LEAST_SHIFT), 24.0) as u32;
+            let pages = last.map(|n| n.max(1).div_ceil(1 << shift));
+            // As `PageMaps` rounds them.
+            let needed = (texels_a_sample * f64::from(1u32 << shift)).ceil().clamp(1.0, f64::from(MOST_CELLS));
+            let depth = pages[0].max(pages[1]).next_power_of_two().ilog2();
+            Self { page_shift: shift, pages, cells: (needed as u32).next_power_of_two(), depth, slots: 0 }
+        };
+        let sizes = (LEAST_CELLS.ilog2()..=MOST_CELLS.ilog2()).map(|shift| cut(1 << shift));
+        let whole = sizes.into_iter().find(|cut| cut.depth <= cut.cells.ilog2());
+        let whole = whole.ok_or_else(|| format!("a picture of {} x {} texels is too large", picture[0], picture[1]))?;
+        let slots = (budget_bytes / whole.tile_bytes()).min(u64::from(most_slots));
+        if slots < LEAST_SLOTS {
+            let needed = (LEAST_SLOTS * whole.tile_bytes()).div_ceil(1_000_000);
+            return Err(format!("texture memory of {} MB: expected at least {needed} MB", budget_bytes / 1_000_000));
+        }
+        Ok(Self { slots: slots as u32, ..whole })
+    }
+
+    /// Bytes of a tile.
+    pub fn tile_bytes(&self) -> u64 {
+        4 * u64::from(self.cells + 1).pow(2)
+    }
+
+    /// Bytes of all tiles kept.
+    pub fn bytes(&self) -> u64 {
+        u64::from(self.slots) * self.tile_bytes()
+    }
+}
+
+/// What a working set holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Figures {
+    /// Tiles there are slots for.
+    pub slots: usize,
+    /// Tiles that are there.
+    pub held: usize,
+    /// Bytes of these.
+    pub bytes: u64,
+    /// Tiles of this frame that are not there yet.
+    pub waiting: usize,
+    /// Pixels that a texel may be long, along an axis: 1, or more where the memory does not hold a finer picture.
+    pub texel_px: f64,
+}
+
+impl fmt::Display for Figures {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { slots, held, bytes, waiting, texel_px } = self;
+        write!(f, "{held} of {slots}, {:.1} MB, {waiting} to come, {texel_px:.1} px", *bytes as f64 / 1e6)
+    }
+}
+
+/// The maps of a picture.
+pub struct PictureMaps {
+    cut: Cut,
+    slots: Slots,
+    land: Land,
+    table: Vec<u32>,
+    texel_px: f64,
+}
+
+/// Where the field lies, and how high.
+struct Land {
+    origin: [f64; 2],
+    spacing: [f64; 2],
+    last: [u32; 2],
+    bounds: Bounds,
+    /// Heights over it where it has a ceiling.
+    top: f32,
+}
+
+impl PictureMaps {
+    /// Filters a picture of RGBA texels, row by row, over a field with samples.
+    pub fn new(field: &Field, cut: Cut, picture: Picture) -> Self {
+        let last = field.size().map(|n| n - 1);
+        let extent = last.map(|n| f64::from(n.max(1)) / f64::from(1u32 << cut.page_shift));
+        let maps = PageMaps::new(picture, Layout { pages: cut.pages, extent, repeats: [false; 2] });
+        debug_assert_eq!(maps.side(0), cut.cells + 1);
+        let depth = cut.depth;
+        let slots = Slots::new(cut.slots, Arc::new(move |node: Node| maps.tile(depth - node.level, node.at)));
+        let pages = cut.pages[0] as usize * cut.pages[1] as usize;
+        Self { cut, slots, land: Land::new(field, &cut), table: vec![entry(0, depth); pages], texel_px: 1.0 }
+    }
+
+    /// How it is cut.
+    pub fn cut(&self) -> &Cut {
+        &self.cut
+    }
+
+    /// Chooses what the pages in sight are drawn with; what is to be filled in before, at most so many tiles.
+    pub fn look(&mut self, view: &View, most_fills: usize) -> Vec<Fill> {
+        let fills = self.slots.begin(most_fills);
+        let (needed, texel_px) = self.needed(view);
+        self.texel_px = texel_px;
+        // What is not in sight is never seen, but always there.
+        self.table.fill(entry(0, self.cut.depth));
+        for node in needed {
+            let served = self.slots.serve(node);
+            self.enter(node, entry(served.slot, self.cut.depth - served.node.level));
+        }
+        self.slots.finish();
+        fills
+    }
+
+    /// What each page is drawn with since the last look, row by row: the slot times 16, and the number of times that the tile
+    /// in it is twice as long as a page.
+    pub fn table(&self) -> &[u32] {
+        &self.table
+    }
+
+    /// Waits until all that was asked for is made.
+    pub fn wait(&mut self) {
+        self.slots.wait();
+    }
+
+    /// What it holds since the last look.
+    pub fn figures(&self) -> Figures {
+        let held = self.slots.held();
+        let bytes = held as u64 * self.cut.tile_bytes();
+        Figures { slots: self.cut.slots as usize, held, bytes, waiting: self.slots.waiting(), texel_px: self.texel_px }
+    }
+
+    fn enter(&mut self, node: Node, entry: u32) {
+        let shift = self.cut.depth - node.level;
+        let along = |k: usize| (node.at[k] << shift)..((node.at[k] + 1) << shift).min(self.cut.pages[k]);
+        for z in along(1) {
+            let row = (z * self.cut.pages[0]) as usize;
+            self.table[row + along(0).start as usize..row + along(0).end as usize].fill(entry);
+        }
+    }
+
+    /// The tiles in sight whose texels are at most a pixel, or as few pixels as there is room for; and how many.
+    fn needed(&self, view: &View) -> (Vec<Node>, f64) {
+        let (most, frustum) = ((self.cut.slots - SPARE) as usize, view.frustum());
+        let mut texel_px = 1.0;
+        loop {
+            let mut nodes = Vec::new();
+            let root = Node { level: 0, at: [0, 0] };
+            if self.visit(root, view, &frustum, texel_px, &mut nodes, most).is_some() {
+                return (nodes, texel_px);
+            }
+            texel_px *= std::f64::consts::SQRT_2;
+        }
+    }
+
+    /// Appends what is needed below a node; `None` if it were more than `most`.
+    fn visit(
+        &self,
+        node: Node,
+        view: &View,
+        frustum: &Frustum,
+        texel_px: f64,
+        found: &mut Vec<Node>,
+        most: usize,
+    ) -> Option<()> {
+        let up = self.cut.depth - node.level;
+        let Some(bounds) = self.land.bounds(up, node.at, self.cut.page_shift) else { return Some(()) };
+        if frustum.contains(&bounds) == Containment::Outside {
+            return Some(());
+        }
+        let texel_m = self.land.spacing[0].max(self.land.spacing[1]) * f64::from(1u32 << (self.cut.page_shift + up))
+            / f64::from(self.cut.cells);
+        if up == 0 || texel_m <= texel_px * pixel_m(view, &bounds) {
+            found.push(node);
+            return (found.len() <= most).then_some(());
+        }
+        let [x, z] = node.at.map(|n| 2 * n);
+        let places = [[x, z], [x + 1, z], [x, z + 1], [x + 1, z + 1]];
+        let is_there = |at: &[u32; 2]| (0..2).all(|k| at[k] << (up - 1) < self.cut.pages[k]);
+        let mut children = places.into_iter().filter(is_there).map(|at| Node { level: node.level + 1, at });
+        children.try_for_each(|child| self.visit(child, view, frustum, texel_px, found, most))
+    }
+}
+
+fn entry(slot: u32, up: u32) -> u32 {
+    slot << 4 | up
+}
+
+/// Size of a pixel at the nearest point of a box, metres.
+fn pixel_m(view: &View, bounds: &Aabb) -> f64 {
+    match view.lens {
+        Lens::Perspective { .. } => bounds.distance(view.eye) / view.focal_px(),
+        Lens::Orthographic { .. } => 1.0 / view.focal_px(),
+    }
+}
+
+impl Land {
+    fn new(field: &Field, cut: &Cut) -> Self {
+        let measure = Measure { cells: 1 << cut.page_shift, growth: 1.0, errors: false, morph: false };
+        Self {
+            origin: field.origin,
+            spacing: field.spacing,
+            last: field.size().map(|n| n - 1),
+            bounds: Bounds::new(field, measure, &Progress::default()),
+            top: field.ceiling().map_or(f32::NEG_INFINITY, |ceiling| ceiling.range()[1]),
+        }
+    }
+
+    /// The box around the land of a tile; `None`: there is none.
+    fn bounds(&self, up: u32, at: [u32; 2], page_shift: u32) -> Option<Aabb> {
+        let [low, high] = self.bounds.square(up, at).range;
+        let corner = |further: u32, y: f32| {
+            let along = |k: usize| f64::from(((at[k] + further) << (page_shift + up)).min(self.last[k]));
+            let [x, z] = [0, 1].map(|k| self.origin[k] + along(k) * self.spacing[k]);
+            DVec3::new(x, f64::from(y), z)
+        };
+        (low <= high).then(|| Aabb { min: corner(0, low), max: corner(1, high.max(self.top)) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::height::{Holes, Samples};
+    use crate::view::{Metric, Tolerance};
+
+    /// Flat land of 257 × 200 samples a metre apart, its west half higher.
+    fn field() -> Field {
+        let heights = (0..257 * 200).map(|k| if k % 257 < 128 { 40.0 } else { 0.0 }).collect();
+        Field::new(Samples::F32(heights), [257, 200], [1.0; 2], Holes::none(257 * 200))
+    }
+
+    fn maps(budget_bytes: u64) -> PictureMaps {
+        let size = [4096, 3184];
+        let texels = (0..size[0] * size[1]).map(|k: u32| k.wrapping_mul(0x9e37_79b1).to_le_bytes()).collect::<Vec<_>>();
+        let cut = Cut::new([256, 199], size, budget_bytes, 2048).unwrap();
+        PictureMaps::new(&field(), cut, Picture { size, texels: &texels })
+    }
+
+    /// From a place 1.7 m above the ground, or from above.
+    fn view(x: f64, above_m: f64, pitch: f64) -> View {
+        View {
+            eye: DVec3::new(x, if x < 128.0 { 40.0 } else { 0.0 } + above_m, 60.0),
+            world_from_eye: View::turned(20.0, pitch, 0.0),
+            lens: Lens::Perspective { fov_x: 1.0 },
+            size: [640, 360],
+            near: 0.1,
+            tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+            time_s: 0.0,
+        }
+    }
+
+    fn settled(maps: &mut PictureMaps, view: &View) -> Figures {
+        for _ in 0..1000 {
+            maps.look(view, 4);
+            maps.wait();
+            if maps.figures().waiting == 0 {
+                return maps.figures();
+            }
+        }
+        panic!("it does not come to rest");
+    }
+
+    #[test]
+    fn a_cut_is_as_fine_as_its_picture() {
+        for (last, picture) in
+            [([1024, 1024], [2048, 2048]), ([5000, 300], [16_384, 1000]), ([64, 64], [20_000, 9]), ([9, 9], [3, 2])]
+        {
+            let cut = Cut::new(last, picture, 1 << 40, 2048).unwrap();
+            let side = 1u32 << cut.page_shift;
+            for k in 0..2 {
+                assert!(u64::from(cut.pages[k]) * u64::from(side) >= u64::from(last[k]));
+                let needed = f64::from(picture[k]) / f64::from(last[k]) * f64::from(side);
+                assert!(f64::from(cut.cells) >= needed, "{needed} texels a page, {cut:?}");
+                assert!(cut.pages[k] <= 1 << cut.depth);
+            }
+            assert!(cut.depth <= cut.cells.ilog2() && cut.bytes() == 2048 * cut.tile_bytes());
+        }
+        let refused = Cut::new([1024, 1024], [2048, 2048], 100_000, 2048).unwrap_err();
+        assert!(refused.contains("expected at least 1 MB"), "{refused}");
+    }
+
+    /// Every page in sight has texels of at most a pixel where it is nearest, and none finer than it need be.
+    #[test]
+    fn texels_are_at_most_a_pixel() {
+        let mut maps = maps(1 << 28);
+        for view in [view(200.0, 1.7, -5.0), view(60.0, 1.7, -5.0), view(128.0, 300.0, -89.0)] {
+            settled(&mut maps, &view);
+            let cut = *maps.cut();
+            let (mut fine, mut coarse) = (0, 0);
+            for (k, entry) in maps.table().iter().enumerate() {
+                let page = [k as u32 % cut.pages[0], k as u32 / cut.pages[0]];
+                let (level, bounds) = (entry & 15, maps.land.bounds(0, page, cut.page_shift).unwrap());
+                if view.frustum().contains(&bounds) == Containment::Outside {
+                    continue;
+                }
+                let texel = |level: u32| f64::from(1u32 << (cut.page_shift + level)) / f64::from(cut.cells);
+                assert!(level == 0 || texel(level) <= pixel_m(&view, &bounds), "page {page:?}: {level}");
+                *(if level == 0 { &mut fine } else { &mut coarse }) += 1;
+                let around = maps.land.bounds(level + 1, page.map(|n| n >> (level + 1)), cut.page_shift);
+                let is_too_fine = around.is_some_and(|b| level < cut.depth && texel(level + 1) <= pixel_m(&view, &b));
+                assert!(!is_too_fine, "page {page:?}: {level}");
+            }
+            assert!(fine + coarse > 10, "{fine} pages with their own maps, {coarse} with coarser ones");
+        }
+    }
+
+    /// The root serves at once, finer ones follow, and the end depends on the view alone.
+    #[test]
+    fn coarse_at_once_and_finer_ones_follow() {
+        let (there, here) = (view(60.0, 1.7, -5.0), view(200.0, 1.7, -5.0));
+        let mut maps = maps(1 << 28);
+        let fills = maps.look(&here, 4);
+        assert_eq!((fills.len(), maps.figures().held), (1, 1), "the root");
+        assert!(maps.table().iter().all(|&t| t == entry(0, maps.cut.depth)) && maps.figures().waiting > 4);
+        let levels = |maps: &PictureMaps| maps.table().iter().map(|entry| entry & 15).collect::<Vec<_>>();
+        settled(&mut maps, &here);
+        let first = levels(&maps);
+        assert!(first.contains(&0), "{first:?}");
+        settled(&mut maps, &there);
+        assert_ne!(levels(&maps), first);
+        settled(&mut maps, &here);
+        assert_eq!(levels(&maps), first);
+    }
+
+    /// With less memory texels are longer, no more tiles are held than there are slots, and every view comes to rest.
+    #[test]
+    fn memory_is_by_choice() {
+        let mut before = f64::INFINITY;
+        for budget in [500_000, 2_000_000, 8_000_000, 1 << 28] {
+            let mut maps = maps(budget);
+            let mut worst: f64 = 0.0;
+            for x in [10.0, 60.0, 120.0, 140.0, 200.0, 250.0] {
+                let figures = settled(&mut maps, &view(x, 1.7, -5.0));
+                assert!(figures.bytes <= budget && figures.held <= figures.slots);
+                worst = worst.max(figures.texel_px);
+            }
+            assert!(worst <= before, "{worst} px after {before} px");
+            before = worst;
+        }
+        assert_eq!(before, 1.0);
+    }
+
+    #[test]
+    fn land_without_samples_needs_nothing() {
+        let heights = vec![0.0; 257 * 200];
+        let mut holes = Holes::none(257 * 200);
+        (0..257 * 200).filter(|k| k % 257 < 200).for_each(|k| holes.insert(k));
+        let field = Field::new(Samples::F32(heights), [257, 200], [1.0; 2], holes);
+        let cut = Cut::new([256, 199], [4096, 3184], 1 << 28, 2048).unwrap();
+        let land = Land::new(&field, &cut);
+        assert!(land.bounds(0, [0, 0], cut.page_shift).is_none());
+        assert!(land.bounds(0, [cut.pages[0] - 1, 0], cut.page_shift).is_some());
+    }
+}

@@ -1,0 +1,173 @@
+//! Command lines: words of every subcommand, right and wrong, up to what a device or a window would be needed for.
+
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+
+use clap::{Arg, Parser};
+use cuesta::cli::bench::{BenchArgs, MeasureArgs};
+use cuesta::cli::cases::Planned;
+use cuesta::cli::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
+use cuesta::cli::{Cli, Command, Common, one_line};
+use cuesta::height::{Field, save, synth};
+use fastrand::Rng;
+
+use super::views::check_list;
+use super::{fuzz, mutate};
+
+/// Fields of more samples are only looked at from outside.
+const MOST_SAMPLES: u64 = 1 << 16;
+
+/// What flags take, right and nearly so, beside [`mutate::WORDS`] and the words that they list themselves.
+const VALUES: [&str; 26] = [
+    "3",
+    "0.25",
+    "17",
+    "320x200",
+    "1x1",
+    "16384x1",
+    "0x9",
+    "5,7",
+    "0.5,1,8",
+    "3,2,9,8",
+    "0,0,33,17",
+    "4,+20,6",
+    "16,+0,8",
+    "1e7,-3,2",
+    "-45",
+    "180",
+    "359.9",
+    "block=17",
+    "block=32",
+    "morph=on",
+    "seams=skirts",
+    "order=painter",
+    "level=4",
+    "33x17:u16le",
+    "1000000,1000000",
+    "4294967295,1",
+];
+
+/// A small file to read.
+static LAND: LazyLock<(tempfile::TempDir, String)> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("land.tif");
+    save::save(&synth::synth(synth::Kind::Fractal, [33, 17], 2), &path).expect("a small file");
+    (folder, path.display().to_string())
+});
+
+fn value(random: &mut Rng, argument: &Arg) -> String {
+    let own = argument.get_possible_values();
+    let technique = |random: &mut Rng| {
+        let entry = mutate::one(random, cuesta::lod::TECHNIQUES);
+        let variant = entry.variants.get(random.usize(..4)).map(|variant| format!(":{}", variant.name));
+        format!("{}{}", entry.name, variant.unwrap_or_default())
+    };
+    match random.u8(..6) {
+        0 => mutate::one(random, &mutate::WORDS).to_string(),
+        _ if !own.is_empty() => mutate::one(random, &own).get_name().to_string(),
+        _ if argument.get_id() == "technique" => technique(random),
+        1 => format!("{},{}", mutate::one(random, &mutate::WORDS), mutate::one(random, &VALUES)),
+        _ => mutate::one(random, &VALUES).to_string(),
+    }
+}
+
+/// A command line without the program's name.
+fn words(random: &mut Rng) -> Vec<String> {
+    let root = cuesta::cli::command();
+    let commands: Vec<_> = root.get_subcommands().collect();
+    let command = mutate::one(random, &commands);
+    let mut words = vec![command.get_name().to_string()];
+    let flags: Vec<_> = command.get_arguments().chain(root.get_arguments()).collect();
+    let positions = flags.iter().filter(|flag| flag.is_positional()).count();
+    words.extend((0..positions).map(|_| if random.u8(..8) == 0 { value(random, flags[0]) } else { LAND.1.clone() }));
+    // What every call needs.
+    words.extend(
+        flags
+            .iter()
+            .filter(|flag| flag.is_required_set() && !flag.is_positional())
+            .flat_map(|flag| [format!("--{}", flag.get_long().unwrap_or_default()), "out.ply".to_string()]),
+    );
+    for _ in 0..random.usize(..7) {
+        let flag = mutate::one(random, &flags);
+        let Some(long) = flag.get_long() else { continue };
+        words.push(format!("--{long}"));
+        if flag.get_action().takes_values() {
+            words.push(value(random, flag));
+        }
+    }
+    if random.u8(..4) == 0 {
+        let at = random.usize(..words.len());
+        let mut bytes = words[at].clone().into_bytes();
+        mutate::bytes(random, &mut bytes, b"--,=:x");
+        words[at] = String::from_utf8_lossy(&bytes).into_owned();
+    }
+    words
+}
+
+/// Holds that an error is one line.
+fn told<T>(result: anyhow::Result<T>) -> Option<T> {
+    let error = match result {
+        Ok(value) => return Some(value),
+        Err(error) => format!("{error:#}"),
+    };
+    assert!(!error.is_empty() && !error.contains('\n'), "{error:?}");
+    None
+}
+
+fn quiet() -> Common {
+    Common { quiet: true, ..Common::default() }
+}
+
+/// Reads the field, and selects in the view if that is soon done.
+fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: Option<&LookArgs>) {
+    look.map(|look| told(look.build(&LAND.1)));
+    let Some((entry, settings)) = told(technique.settings()) else { return };
+    let Some(loaded) = told(ReadArgs { no_cache: true, ..reading.clone() }.load(&quiet(), &LAND.1)) else { return };
+    let field: Arc<Field> = Arc::new(loaded.field);
+    let Some(view) = told(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else { return };
+    let [w, h] = field.size().map(u64::from);
+    if w * h <= MOST_SAMPLES {
+        let prepared = entry.prepare(&field, &settings).map_err(anyhow::Error::msg);
+        if let Some(mut technique) = told(prepared) {
+            check_list(&field, &view, technique.as_mut());
+        }
+    }
+}
+
+fn measured(args: &MeasureArgs) {
+    let is_small = args.terrain.iter().all(|file| *file == LAND.1) && args.reading.tile.is_none() && !args.kit;
+    if is_small {
+        told(Planned::new(&quiet(), args));
+    }
+}
+
+fn check(words: &[String]) {
+    let cli = match Cli::try_parse_from(std::iter::once("cuesta").chain(words.iter().map(String::as_str))) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let line = one_line(&error);
+            assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
+            return;
+        }
+    };
+    match cli.command {
+        Some(Command::Export(args)) => looked(&args.terrain.reading, &args.view, &args.technique, None),
+        Some(Command::Info(args)) => looked(&args.reading, &args.view, &args.technique, Some(&args.look)),
+        #[cfg(feature = "vulkan")]
+        Some(Command::Render(args)) => {
+            looked(&args.terrain.reading, &args.view, &args.technique, Some(&args.look));
+        }
+        #[cfg(feature = "vulkan")]
+        Some(Command::Profile(args)) => {
+            looked(&args.terrain.reading, &args.view, &args.technique, Some(&args.look));
+        }
+        Some(Command::Bench(BenchArgs { action: None, measure })) => measured(&measure),
+        _ => {}
+    }
+}
+
+#[test]
+fn whatever_the_words_an_answer_or_one_line() {
+    assert!(Path::new(&LAND.1).is_file());
+    fuzz("arguments", words, check);
+}

@@ -1,0 +1,156 @@
+//! Views as the command line takes them, one after the other through every technique: lists that fit their field.
+
+use std::sync::{Arc, LazyLock};
+
+use cuesta::cli::scene::ViewArgs;
+use cuesta::draw::layout::Frame;
+use cuesta::draw::{DrawList, expand};
+use cuesta::height::bezier::{Bezier, LAYERS};
+use cuesta::height::{Field, Holes, Samples, synth};
+use cuesta::stress::forms::{Form, every_word};
+use cuesta::view::{Metric, Tolerance, View};
+use fastrand::Rng;
+
+use super::fuzz;
+
+/// One view in numbers; the first of a sequence says by `pick` which technique and field it is of.
+#[derive(Clone, Debug)]
+pub struct Pose {
+    pick: usize,
+    eye: [f64; 3],
+    look: Option<[f64; 3]>,
+    angles: [f64; 3],
+    fov: f64,
+    size: [u32; 2],
+    near: Option<f64>,
+    ortho: Option<f64>,
+    tolerance: Tolerance,
+    time_s: f64,
+}
+
+/// Fields that differ in what is hard about them.
+pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
+    let land = |kind, size| synth::synth(kind, size, 3);
+    let mut spaced = land(synth::Kind::Fractal, [33, 17]);
+    spaced.spacing = [1e-3, 1e5];
+    let mut far = land(synth::Kind::Spike, [17, 21]);
+    far.origin = [1e7, -6.4e6];
+    let mut holes = Holes::none(25);
+    (5..12).for_each(|k| holes.insert(k));
+    let holed = Field::new(Samples::F32((0..25).map(|k| (k * k % 7) as f32).collect()), [5, 5], [1.0; 2], holes);
+    let smallest = Field::new(Samples::F32(vec![0.0, 1e7, -1e7, 1e-30]), [2, 2], [3.0, 0.5], Holes::none(4));
+    let tiled = land(synth::Kind::Checker, [9, 7]).tiled([3, 5]);
+    [spaced, far, holed, smallest, tiled, land(synth::Kind::Cliff, [65, 65])].map(Arc::new).to_vec()
+});
+
+static ENDLESS: LazyLock<Arc<Field>> = LazyLock::new(|| Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS)))));
+static FORMS: LazyLock<Vec<Form>> = LazyLock::new(|| every_word(&[]).expect("the table's own"));
+
+/// A number: within the field, at a sample, or far beyond all reason.
+fn number(random: &mut Rng, scale: f64) -> f64 {
+    let sign = if random.bool() { 1.0 } else { -1.0 };
+    match random.u8(..8) {
+        0 => 0.0,
+        1 => sign * 10f64.powi(random.i32(-20..=14)),
+        2 if random.bool() => sign * f64::from_bits(random.u64(..0x7ff0 << 48)),
+        3 | 4 => (scale * random.f64()).round(),
+        _ => scale * (1.4 * random.f64() - 0.2),
+    }
+}
+
+fn pose(random: &mut Rng, pick: usize) -> Pose {
+    let [w, h] = field(pick).size().map(f64::from);
+    let spacing = field(pick).spacing;
+    let origin = field(pick).origin;
+    let point = |random: &mut Rng| {
+        [number(random, w) * spacing[0] + origin[0], number(random, 500.0), number(random, h) * spacing[1] + origin[1]]
+    };
+    let positive = |random: &mut Rng, scale| number(random, scale).abs().max(f64::MIN_POSITIVE);
+    Pose {
+        pick,
+        eye: point(random),
+        look: random.bool().then(|| point(random)),
+        angles: [0; 3].map(|_| number(random, 360.0)),
+        fov: if random.bool() { 60.0 } else { number(random, 180.0) },
+        size: [0; 2].map(|_| if random.bool() { random.u32(1..200) } else { 1 << random.u32(..15) }),
+        near: random.bool().then(|| positive(random, 1.0)),
+        ortho: (random.u8(..4) == 0).then(|| positive(random, 100.0)),
+        tolerance: Tolerance {
+            px: positive(random, 4.0),
+            metric: if random.bool() { Metric::Certified } else { Metric::Paper },
+        },
+        time_s: number(random, 10.0),
+    }
+}
+
+fn form(pick: usize) -> &'static Form {
+    &FORMS[pick % FORMS.len()]
+}
+
+fn field(pick: usize) -> &'static Arc<Field> {
+    let is_endless = form(pick).entry.takes_endless && (pick / FORMS.len()).is_multiple_of(16);
+    if is_endless { &ENDLESS } else { &FIELDS[pick / FORMS.len() % FIELDS.len()] }
+}
+
+impl Pose {
+    /// The view, if the command line takes it.
+    fn view(&self, field: &Field) -> Option<View> {
+        let point = |[x, y, z]: [f64; 3]| format!("{x:e},{y:e},{z:e}");
+        let [yaw, pitch, roll] = self.angles;
+        let is_turned = self.look.is_none();
+        let arguments = ViewArgs {
+            eye: Some(point(self.eye)),
+            look: self.look.map(point),
+            yaw: is_turned.then_some(yaw),
+            pitch: is_turned.then_some(pitch),
+            roll,
+            fov: self.fov,
+            size: self.size,
+            near: self.near,
+            ortho: self.ortho,
+        };
+        match arguments.build(field, self.tolerance) {
+            Ok(view) => Some(View { time_s: self.time_s, ..view }),
+            Err(error) => {
+                let error = format!("{error:#}");
+                assert!(!error.contains('\n') && error.starts_with("--"), "{error:?}");
+                None
+            }
+        }
+    }
+}
+
+/// Holds what any view may ask of any technique: triangles of the field, of numbers.
+pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::Technique) {
+    let mut list = DrawList::default();
+    technique.select(view, &mut list);
+    assert!(list.widening >= 1.0, "widening {}", list.widening);
+    if field.land().is_some() {
+        return;
+    }
+    let [w, h] = field.size().map(i64::from);
+    let is_inside = |corner: &cuesta::height::surface::Corner| {
+        (0..w).contains(&i64::from(corner.x)) && (0..h).contains(&i64::from(corner.z)) && corner.y.is_finite()
+    };
+    expand::visit_triangles(field, &Frame::placing(field, view), technique.resident(), &list, |drawn| {
+        assert!(drawn.corners.iter().all(is_inside), "{:?}", drawn.corners);
+    });
+}
+
+fn check(poses: &[Pose]) {
+    let Some(Pose { pick, .. }) = poses.first() else { return };
+    let (form, field) = (form(*pick), field(*pick));
+    let Ok(mut technique) = form.entry.prepare(field, &form.settings) else { return };
+    for view in poses.iter().filter_map(|pose| pose.view(field)) {
+        check_list(field, &view, technique.as_mut());
+    }
+}
+
+#[test]
+fn whatever_the_view_a_list_that_fits() {
+    let generate = |random: &mut Rng| {
+        let pick = random.usize(..1 << 30);
+        (0..random.usize(1..6)).map(|_| pose(random, pick)).collect()
+    };
+    fuzz("views", generate, check);
+}

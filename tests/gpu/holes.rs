@@ -1,0 +1,50 @@
+//! What counts as a hole at the edge of a picture.
+
+use std::sync::Arc;
+
+use cuesta::height::synth;
+use cuesta::measure::picture::outline_radius;
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::scene::Scene;
+use cuesta::scene::holes::Truth;
+use cuesta::view::{Lens, Tolerance, View};
+use glam::DVec3;
+
+use super::{aslant, on_device};
+
+/// From straight above, the land's edge lies three pixels outside of the picture on one side and far outside on the
+/// other: an open pixel at the one side may be an outline within the tolerance, one at the other is a hole.
+#[test]
+fn an_outline_just_outside_of_the_picture_may_come_in() {
+    on_device(|gpu| {
+        let (field, look) = (Arc::new(synth::synth(synth::Kind::Fractal, [131, 97], 5)), Look::default());
+        let (size, metres, outside) = ([64, 48], field.spacing[0], 3.0);
+        let [x, z] = [outside + f64::from(size[0]) / 2.0, f64::from(field.size()[1]) / 2.0];
+        let view = View {
+            eye: field.world_at(0.0, z, 9000.0) + DVec3::new(x * metres, 0.0, 0.0),
+            world_from_eye: View::looking_along(DVec3::NEG_Y),
+            lens: Lens::Orthographic { width: f64::from(size[0]) * metres, far: 20_000.0 },
+            ..aslant(&field, size, 1.0)
+        };
+        let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+        let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+        let truth = Truth::new(&scene, &view).unwrap();
+        assert!(truth.picture.pixels().all(|p| p.0[3] == 255), "land fills the picture");
+        let right = size[0] - 1;
+        let open = |columns: &[u32]| {
+            let mut picture = truth.picture.clone();
+            columns.iter().for_each(|&x| picture.put_pixel(x, 20, image::Rgba([0; 4])));
+            picture
+        };
+        let holes = |px: f64, columns: &[u32]| {
+            let tolerance = Tolerance { px, ..view.tolerance };
+            let row = 20 * size[0] as usize;
+            let found = truth.hole_pixels(&scene, &View { tolerance, ..view }, &open(columns)).unwrap();
+            found.into_iter().map(|k| (k - row) as u32).collect::<Vec<_>>()
+        };
+        assert_eq!(holes(1.0, &[0, 1, 20, right]), [0, 1, 20, right], "{} pixels do not reach", outline_radius(1.0));
+        assert_eq!(holes(4.0, &[0, 1, 2, 20, right]), [2, 20, right]);
+        assert_eq!(holes(15.0, &[0, 1, 20, right]), [20, right]);
+        assert_eq!(holes(40.0, &[0, 20, right]), [right], "from the other side the edge is far still");
+    });
+}

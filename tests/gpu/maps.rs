@@ -1,0 +1,154 @@
+//! A picture in maps of its pages: the same to see as the whole, within less memory.
+
+use std::sync::Arc;
+
+use cuesta::gpu::Gpu;
+use cuesta::height::Field;
+use cuesta::plan::{Colour, Look, ScenePlan};
+use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::view::{Lens, View};
+use glam::DVec3;
+use image::{Rgba, RgbaImage};
+
+use super::{aslant, difference, mountains, on_device, technique};
+
+/// Texels a sample, and a page that is 16 samples long.
+const FINE: u32 = 8;
+const PAGE_M: [f64; 2] = [16.0 * 20.0, 16.0 * 25.0];
+
+fn field() -> Arc<Field> {
+    Arc::new((*mountains()).clone().without_holes())
+}
+
+/// Waves of a dozen texels and more.
+fn picture(field: &Field) -> RgbaImage {
+    let [w, h] = field.size().map(|n| FINE * (n - 1));
+    RgbaImage::from_fn(w, h, |x, z| {
+        let wave = |t: f64| (127.5 + 100.0 * t.sin()) as u8;
+        let (x, z) = (f64::from(x), f64::from(z));
+        Rgba([wave(x / 3.0), wave(z / 4.0 + x / 50.0), wave((x + z) / 9.0), 255])
+    })
+}
+
+fn look(texture_bytes: u64) -> Look {
+    Look { colour: Colour::Overlay, texture_bytes, ..Look::default() }
+}
+
+fn plan(gpu: &Gpu, field: &Arc<Field>, look: &Look, picture: &RgbaImage) -> ScenePlan {
+    let limits = gpu.device_limits();
+    let plan = ScenePlan::new(field, look, &limits).unwrap();
+    let plan = plan.with_overlay(field, look, &limits, Some(picture.dimensions().into())).unwrap();
+    plan.with_manner(technique(field, "sorted-strips", &[]).manner())
+}
+
+/// A scene made ready for strips with so many bytes for the picture.
+fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, texture_bytes: u64, view: &View) -> Stage {
+    let look = look(texture_bytes);
+    let plan = plan(gpu, field, &look, picture);
+    let strips = technique(field, "sorted-strips", &[]);
+    Scene { gpu, field, plan: &plan, look: &look, overlay: Some(picture) }.stage(strips.as_ref(), view.size).unwrap()
+}
+
+fn drawn(stage: &mut Stage, field: &Arc<Field>, view: &View) -> RgbaImage {
+    stage.draw(technique(field, "sorted-strips", &[]).as_mut(), view, Copy::Picture).unwrap();
+    stage.picture()
+}
+
+const WHOLE: u64 = 1 << 30;
+/// The whole takes 3.2 MB.
+const PARTS: u64 = 3_000_000;
+
+/// From straight above, so and so many metres a pixel.
+fn above(field: &Field, at: DVec3, metres_px: f64) -> View {
+    let mut view = aslant(field, [320, 240], 0.5);
+    view.eye = at;
+    view.world_from_eye = View::looking_along(DVec3::NEG_Y);
+    view.lens = Lens::Orthographic { width: 320.0 * metres_px, far: 20_000.0 };
+    view
+}
+
+/// Largest and mean difference of channels, over pixels on the edge between pages and over all others.
+fn differences(a: &RgbaImage, b: &RgbaImage, on_edge: impl Fn(u32, u32) -> bool) -> [(u8, f64); 2] {
+    let mut found = [(0, 0.0, 0.0); 2];
+    for (x, y, pixel) in a.enumerate_pixels() {
+        let apart = pixel.0.iter().zip(b.get_pixel(x, y).0).map(|(p, q)| p.abs_diff(q)).max().unwrap_or(0);
+        let (largest, sum, count) = &mut found[usize::from(!on_edge(x, y))];
+        *largest = apart.max(*largest);
+        *sum += f64::from(apart);
+        *count += 1.0;
+    }
+    found.map(|(largest, sum, count)| (largest, sum / f64::max(count, 1.0)))
+}
+
+/// At full resolution the picture is that of the whole, at the edges of pages as inside.
+#[test]
+fn maps_show_the_picture_without_seams() {
+    on_device(|gpu| {
+        let field = field();
+        let picture = picture(&field);
+        let view = above(&field, field.world_at(63.0, 47.0, 9000.0), 2.0);
+        let whole = drawn(&mut stage(gpu, &field, &picture, WHOLE, &view), &field, &view);
+        let mut parts = stage(gpu, &field, &picture, PARTS, &view);
+        parts.settle(&view).unwrap();
+        let in_parts = drawn(&mut parts, &field, &view);
+        let maps = parts.maps().expect("in parts");
+        assert!(maps.waiting == 0 && maps.texel_px == 1.0 && maps.bytes <= PARTS, "{maps}");
+        // North is up: x goes right and z down.
+        let place = |k: usize, n: u32| {
+            let (first, size) = ([view.eye.x, view.eye.z][k], [320.0, 240.0][k]);
+            let along = first + (f64::from(n) + 0.5 - size / 2.0) * 2.0 - [field.origin[0], field.origin[1]][k];
+            (along / PAGE_M[k] - (along / PAGE_M[k]).round()).abs() * PAGE_M[k]
+        };
+        let on_edge = |x: u32, y: u32| place(0, x) <= 2.5 || place(1, y) <= 2.5;
+        let [edges, inside] = differences(&whole, &in_parts, on_edge);
+        println!("edges {edges:?}, inside {inside:?}");
+        assert!(inside.0 <= 12 && inside.1 < 2.5, "inside: {inside:?}");
+        assert!(edges.0 <= inside.0 + 1 && edges.1 < inside.1 + 0.5, "edges {edges:?}, inside {inside:?}");
+    });
+}
+
+/// What is there is drawn at once, and finer maps follow; the end is the same on every way there.
+#[test]
+fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
+    on_device(|gpu| {
+        let field = field();
+        let picture = picture(&field);
+        let view = aslant(&field, [320, 240], 1.0);
+        let near = above(&field, field.world_at(30.0, 30.0, 9000.0), 2.0);
+        let mut parts = stage(gpu, &field, &picture, PARTS, &view);
+        let first = drawn(&mut parts, &field, &near);
+        assert!(parts.maps().unwrap().waiting > 0);
+        parts.settle(&near).unwrap();
+        let settled = drawn(&mut parts, &field, &near);
+        assert!(difference(&first, &settled, 8).1 > 0.5, "the root alone shows waves of a dozen texels");
+        assert!(first.pixels().all(|pixel| pixel.0[3] == 255), "land is drawn at once");
+        parts.settle(&view).unwrap();
+        let aslant = drawn(&mut parts, &field, &view);
+        assert!(difference(&aslant, &settled, 8).1 > 0.1);
+        parts.settle(&near).unwrap();
+        assert_eq!(drawn(&mut parts, &field, &near), settled);
+    });
+}
+
+/// Frames on a way, with maps made, filled in and given away while others are drawn: nothing for the validation layers to
+/// say, the memory kept, and all land covered.
+#[test]
+fn maps_come_and_go_on_a_way() {
+    on_device(|gpu| {
+        let field = field();
+        let picture = picture(&field);
+        let least = 500_000;
+        let at = |x: f64| above(&field, field.world_at(x, 47.0, 9000.0), 2.0);
+        let mut parts = stage(gpu, &field, &picture, least, &at(20.0));
+        let mut held = Vec::new();
+        for frame in 0..40 {
+            let view = at(20.0 + 2.0 * f64::from(frame));
+            let shown = drawn(&mut parts, &field, &view);
+            assert!(shown.pixels().all(|pixel| pixel.0[3] == 255));
+            let maps = parts.maps().unwrap();
+            assert!(maps.bytes <= least && maps.texel_px > 1.0, "{maps}");
+            held.push(maps.held);
+        }
+        assert!(held.iter().max() > held.iter().min());
+    });
+}
