@@ -3,18 +3,20 @@
 layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
 layout(set = 0, binding = 3) uniform sampler2D overlay;
 
-// The overlay as maps of its pages (src/texture/picture_maps.rs): tiles, and for each page which one and its level.
+// The overlay as maps of its pages (src/texture/picture_maps.rs): tiles, and for each page which one and its level. Or
+// nodes of the ground (src/texture/node_table.rs).
 layout(set = 0, binding = 6) uniform sampler2DArray maps;
 layout(set = 0, binding = 7, scalar) readonly buffer MapTable { uint map_table[]; };
 
 layout(constant_id = 3) const bool HOLES = false;
 layout(constant_id = 4) const bool FOG = false;
-// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch, 6 maps (plan::Colour).
+// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch, 6 maps, 7 ground, 8 its nodes (plan::Colour).
 layout(constant_id = 5) const uint COLOUR = 0;
 // The height texture can be filtered linearly by the device.
 layout(constant_id = 6) const bool FILTERED = false;
 
-// Side of a page of the overlay as a power of two; 0: it is there as a whole.
+// Side of a page of the overlay as a power of two; 0: it is there as a whole. For the ground: parts of a sample of which
+// 2^32 are the root square's side, as a power of two.
 layout(constant_id = 13) const uint MAP_SHIFT = 0;
 
 bool is_hole(ivec2 at) {
@@ -159,16 +161,36 @@ Tile tile_at(Cell cell) {
     return Tile(share, entry >> 4, entry & 15u);
 }
 
-vec3 overlay_albedo(Cell cell, vec2 lattice) {
-    if (MAP_SHIFT == 0) return texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
-    Tile tile = tile_at(cell);
+// The smallest node of the ground's map around a place that has texels.
+Tile ground_at(Cell cell) {
+    uvec2 parts = min(uvec2(cell.inside * float(1u << MAP_SHIFT)), (1u << MAP_SHIFT) - 1u);
+    uvec2 place = (uvec2(cell.at) << MAP_SHIFT) | parts;
+    uint node = 0, slot = 0, level = 0;
+    for (uint depth = 0; depth < 32; depth++) {
+        uint own = map_table[5 * node];
+        if (own != 0) {
+            slot = own - 1;
+            level = depth;
+        }
+        uvec2 part = (place >> (31 - depth)) & 1u;
+        node = map_table[5 * node + 1 + part.x + 2 * part.y];
+        if (node == 0) break;
+    }
+    return Tile(vec2(place << level) * (1.0 / 4294967296.0), slot, level);
+}
+
+vec3 texels(Tile tile) {
     float side = float(textureSize(maps, 0).x);
     return textureLod(maps, vec3((tile.share * (side - 1.0) + 0.5) / side, float(tile.slot)), 0.0).rgb;
 }
 
+vec3 overlay_albedo(Cell cell, vec2 lattice) {
+    if (MAP_SHIFT == 0) return texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
+    return texels(tile_at(cell));
+}
+
 // Which tile that is: a hue a level, with a dark edge.
-vec3 tile_colour(Cell cell) {
-    Tile tile = tile_at(cell);
+vec3 tile_colour(Tile tile) {
     vec2 edge = min(tile.share, 1.0 - tile.share);
     return palette(tile.level) * (min(edge.x, edge.y) < 0.02 ? 0.2 : 1.0);
 }
@@ -194,7 +216,9 @@ vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
     }
     if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
     else if (COLOUR == 2) albedo = overlay_albedo(cell, lattice);
-    else if (COLOUR == 6) albedo = MAP_SHIFT == 0 ? overlay_albedo(cell, lattice) : tile_colour(cell);
+    else if (COLOUR == 6) albedo = MAP_SHIFT == 0 ? overlay_albedo(cell, lattice) : tile_colour(tile_at(cell));
+    else if (COLOUR == 7) albedo = texels(ground_at(cell));
+    else if (COLOUR == 8) albedo = tile_colour(ground_at(cell));
     else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
     else if (COLOUR == 5) albedo = palette(level_batch.y);
     else if (DETAIL) albedo = ground;

@@ -131,7 +131,8 @@ pub struct LookArgs {
     /// A picture laid over the field.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
-    /// Device memory for the overlay, megabytes: a larger one is there in maps of its pages, finer where they are seen.
+    /// Device memory for the overlay, or for the texels of `--colour ground`, megabytes: what is larger is there in parts,
+    /// finer where they are seen.
     #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
@@ -206,6 +207,10 @@ pub enum ColourArg {
     Batch,
     /// Level and edges of the overlay's maps (--texture-memory).
     Maps,
+    /// A ground of 2^36 texels, made where they are seen.
+    Ground,
+    /// Level and edges of the nodes of that ground's map.
+    Nodes,
 }
 
 impl MetricArg {
@@ -349,6 +354,8 @@ impl LookArgs {
             (Some(ColourArg::Normal), _) => Colour::Normal,
             (Some(ColourArg::Batch), _) => Colour::Batch,
             (Some(ColourArg::Maps), _) => Colour::Maps,
+            (Some(ColourArg::Ground), _) => Colour::Ground,
+            (Some(ColourArg::Nodes), _) => Colour::Nodes,
             (Some(ColourArg::Overlay), _) | (None, Some(_)) => Colour::Overlay,
             (None, None) if is_demo(terrain) => Colour::Overlay,
             (None, None) => Colour::Height,

@@ -8,6 +8,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::Gpu;
+use super::frames::once;
 
 /// A buffer.
 pub struct Buffer {
@@ -243,6 +244,31 @@ impl Drop for Image {
             self.memory.gpu.raw.destroy_image(self.raw, None);
         }
     }
+}
+
+/// A device-local buffer with this content.
+pub(super) fn filled(
+    gpu: &Arc<Gpu>,
+    purpose: &'static str,
+    data: &[u8],
+    usage: vk::BufferUsageFlags,
+) -> Result<Buffer> {
+    let buffer = Buffer::device(gpu, purpose, data.len() as u64, usage)?;
+    if data.is_empty() {
+        return Ok(buffer);
+    }
+    let mut staging = Buffer::host(gpu, "staging", data.len() as u64, vk::BufferUsageFlags::TRANSFER_SRC)?;
+    staging.write(0, data);
+    once(gpu, |r| {
+        let region = [vk::BufferCopy { size: data.len() as u64, ..Default::default() }];
+        // SAFETY: both buffers outlive the wait in `once`.
+        unsafe { gpu.raw.cmd_copy_buffer(r.commands, staging.raw, buffer.raw, &region) };
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let read = (Stage::ALL_COMMANDS, Access::MEMORY_READ);
+        memory_barrier(gpu, r.commands, (Stage::COPY, Access::TRANSFER_WRITE), read);
+        Ok(())
+    })?;
+    Ok(buffer)
 }
 
 /// A barrier over all of an image: stage, access and layout before and after.

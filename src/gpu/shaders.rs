@@ -59,7 +59,7 @@ impl Constants {
             flag(plan.manner.morph == Morph::ByDistance),
             flag(plan.stored.iter().all(|n| n.is_power_of_two())),
             flag(plan.ceiling),
-            plan.maps.map_or(0, |cut| cut.page_shift),
+            plan.ground.map_or(plan.maps.map_or(0, |cut| cut.page_shift), |cut| 32 - cut.root_shift),
         ])
     }
 

@@ -9,9 +9,9 @@ use bytemuck::cast_slice;
 
 use super::device::Gpu;
 use super::driven::Driven;
-use super::frames::{Recording, SLOTS, once};
+use super::frames::{Recording, SLOTS};
 use super::materials;
-use super::memory::{Buffer, Image, memory_barrier};
+use super::memory::{Buffer, Image, filled, memory_barrier};
 use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
 use super::target::Formats;
@@ -31,7 +31,7 @@ pub struct Terrain {
     descriptors: vk::DescriptorPool,
     samplers: [Sampler; IMAGES],
     images: [Image; IMAGES],
-    /// The maps of the picture laid over it.
+    /// What is laid over it in parts.
     pub overlay: Overlay,
     driven: Option<Driven>,
 }
@@ -69,7 +69,7 @@ impl Terrain {
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
-        field: &Field,
+        field: &Arc<Field>,
         overlay: Option<&image::RgbaImage>,
         kept: Kept,
         formats: Formats,
@@ -98,6 +98,8 @@ impl Terrain {
         ];
         let resident = Resident::new(gpu, kept.geometry)?;
         let driven = driven(gpu, kept.driver)?;
+        let overlay = Overlay::new(gpu, plan, field, overlay)?;
+        // Last: whoever fails before has none to destroy.
         let descriptors = descriptor_pool(gpu)?;
         let mut terrain = Self {
             gpu: Arc::clone(gpu),
@@ -108,7 +110,7 @@ impl Terrain {
             descriptors,
             samplers,
             images,
-            overlay: Overlay::new(gpu, plan, field, overlay)?,
+            overlay,
             driven,
         };
         terrain.make_slots()?;
@@ -128,11 +130,21 @@ impl Terrain {
         Ok(())
     }
 
-    /// Gives the scene another look: only pipelines are made anew. The plan must be of the same field on the
-    /// same device, and an overlay is the one that the scene was made with.
-    pub fn replan(&mut self, plan: &ScenePlan, formats: Formats) -> Result<()> {
+    /// Gives the scene another look: only pipelines are made anew, and what is laid over it in parts if that is another. The
+    /// plan must be of the same field on the same device, and the picture the one that the scene was made with.
+    pub fn replan(
+        &mut self,
+        plan: &ScenePlan,
+        field: &Arc<Field>,
+        picture: Option<&image::RgbaImage>,
+        formats: Formats,
+    ) -> Result<()> {
         self.gpu.wait_idle()?;
         self.pipelines = Pipelines::new(&self.gpu, plan, formats)?;
+        if !self.overlay.serves(plan) {
+            self.overlay = Overlay::new(&self.gpu, plan, field, picture)?;
+            self.remake_slots()?;
+        }
         Ok(())
     }
 
@@ -145,12 +157,18 @@ impl Terrain {
     pub fn retarget(&mut self, kept: Kept) -> Result<()> {
         self.gpu.wait_idle()?;
         self.slots.clear();
-        // SAFETY: the device is idle and the slots that used the sets are gone.
-        unsafe { self.gpu.raw.reset_descriptor_pool(self.descriptors, vk::DescriptorPoolResetFlags::empty())? };
         self.driven = None;
         self.resident = Resident::new(&self.gpu, kept.geometry)?;
         self.limits = kept.limits;
         self.driven = driven(&self.gpu, kept.driver)?;
+        self.remake_slots()
+    }
+
+    /// The device must be idle.
+    fn remake_slots(&mut self) -> Result<()> {
+        self.slots.clear();
+        // SAFETY: the device is idle and the slots that used the sets are gone.
+        unsafe { self.gpu.raw.reset_descriptor_pool(self.descriptors, vk::DescriptorPoolResetFlags::empty())? };
         self.make_slots()
     }
 
@@ -380,31 +398,6 @@ impl Resident {
             indices: filled(gpu, "resident indices", cast_slice(&geometry.indices), index)?,
         })
     }
-}
-
-/// A device-local buffer with this content.
-pub(super) fn filled(
-    gpu: &Arc<Gpu>,
-    purpose: &'static str,
-    data: &[u8],
-    usage: vk::BufferUsageFlags,
-) -> Result<Buffer> {
-    let buffer = Buffer::device(gpu, purpose, data.len() as u64, usage)?;
-    if data.is_empty() {
-        return Ok(buffer);
-    }
-    let mut staging = Buffer::host(gpu, "staging", data.len() as u64, vk::BufferUsageFlags::TRANSFER_SRC)?;
-    staging.write(0, data);
-    once(gpu, |r| {
-        let region = [vk::BufferCopy { size: data.len() as u64, ..Default::default() }];
-        // SAFETY: both buffers outlive the wait in `once`.
-        unsafe { gpu.raw.cmd_copy_buffer(r.commands, staging.raw, buffer.raw, &region) };
-        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let read = (Stage::ALL_COMMANDS, Access::MEMORY_READ);
-        memory_barrier(gpu, r.commands, (Stage::COPY, Access::TRANSFER_WRITE), read);
-        Ok(())
-    })?;
-    Ok(buffer)
 }
 
 impl Slot {

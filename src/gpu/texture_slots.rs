@@ -1,8 +1,9 @@
-//! An array of texture slots of one size that frames fill while they are drawn, and the maps of a picture in it.
+//! An array of texture slots of one size that frames fill while they are drawn, with the maps of a picture in it or the
+//! texels of the ground.
 //!
 //! A slot is a layer of one array image, bound by a plain descriptor. A frame copies at most so many bytes into slots, from
 //! staging of its own, before it draws; the barrier before the copies waits for the frames that still read. Whoever
-//! chooses the slots ([`PictureMaps`]) gives none away that served in the frame before, so that with two frames in flight
+//! chooses the slots ([`PictureMaps`], [`GroundMaps`]) gives none away that served in the frame before, so that with two frames in flight
 //! nothing that is read is overwritten.
 
 use std::sync::Arc;
@@ -14,8 +15,10 @@ use super::device::Gpu;
 use super::frames::{Recording, SLOTS, once};
 use super::memory::{Buffer, Image, ImageInfo, barriers};
 use super::pages::{self, Sampler, Sampling};
+use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
 use crate::plan::ScenePlan;
+use crate::texture::ground_maps::{GroundCut, GroundMaps};
 use crate::texture::page_maps::Picture;
 pub use crate::texture::picture_maps::Figures;
 use crate::texture::picture_maps::PictureMaps;
@@ -109,60 +112,120 @@ const READ: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
 const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
 
-/// The maps of the picture laid over a scene; without a picture, or with one that is there as a whole, stand-ins.
+/// The texels laid over a scene in parts: those of a picture, or of the ground; without either stand-ins.
 pub struct Overlay {
     /// The slots.
     pub slots: TextureSlots,
-    /// Each page's entry, one table a frame in flight.
+    /// In which a fragment finds its part, one table a frame in flight.
     pub tables: Vec<Buffer>,
-    maps: Option<PictureMaps>,
+    parts: Parts,
+}
+
+/// Whose texels they are.
+enum Parts {
+    None,
+    Picture(PictureMaps),
+    Ground(Box<GroundMaps>),
 }
 
 impl Overlay {
-    /// What the plan says of the picture.
-    pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field, picture: Option<&image::RgbaImage>) -> Result<Self> {
-        let maps = plan.maps.zip(picture).map(|(cut, picture)| {
-            let texels = bytemuck::cast_slice(picture.as_raw());
-            PictureMaps::new(field, cut, Picture { size: picture.dimensions().into(), texels })
-        });
-        let slots = match &maps {
-            Some(maps) => TextureSlots::new(gpu, "texture maps", maps.cut().cells + 1, maps.cut().slots)?,
-            None => TextureSlots::new(gpu, "no texture maps", 1, 1)?,
+    /// What the plan says of the picture and the ground.
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        plan: &ScenePlan,
+        field: &Arc<Field>,
+        picture: Option<&image::RgbaImage>,
+    ) -> Result<Self> {
+        let parts = match (plan.ground, plan.maps.zip(picture)) {
+            (Some(cut), _) => Parts::Ground(Box::new(GroundMaps::new(field, cut))),
+            (None, Some((cut, picture))) => {
+                let texels = bytemuck::cast_slice(picture.as_raw());
+                Parts::Picture(PictureMaps::new(field, cut, Picture { size: picture.dimensions().into(), texels }))
+            }
+            (None, None) => Parts::None,
         };
-        let entries = maps.as_ref().map_or(1, |maps| maps.table().len());
-        let table = |_| Buffer::host(gpu, "texture table", 4 * entries as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, maps };
-        overlay.write_root();
+        let (slots, words) = match &parts {
+            Parts::None => (TextureSlots::new(gpu, "no texture maps", 1, 1)?, 1),
+            Parts::Picture(maps) => {
+                let cut = maps.cut();
+                (TextureSlots::new(gpu, "texture maps", cut.cells + 1, cut.slots)?, maps.table().len())
+            }
+            Parts::Ground(maps) => {
+                let cut = maps.cut();
+                (TextureSlots::new(gpu, "ground texels", GroundCut::tile_side(), cut.slots)?, cut.table_words())
+            }
+        };
+        let table = |_| Buffer::host(gpu, "texture table", 4 * words as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
+        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, parts };
+        // Everything by the root.
+        if let Some(table) = overlay.parts.table() {
+            overlay.tables.iter_mut().for_each(|buffer| buffer.write(0, bytemuck::cast_slice(table)));
+        }
         Ok(overlay)
     }
 
-    /// Every page by the root's tile.
-    fn write_root(&mut self) {
-        if let Some(maps) = &self.maps {
-            self.tables.iter_mut().for_each(|table| table.write(0, bytemuck::cast_slice(maps.table())));
+    /// Whether it is what a plan says.
+    pub fn serves(&self, plan: &ScenePlan) -> bool {
+        match &self.parts {
+            Parts::None => plan.ground.is_none() && plan.maps.is_none(),
+            Parts::Picture(maps) => plan.ground.is_none() && plan.maps == Some(*maps.cut()),
+            Parts::Ground(maps) => plan.ground == Some(*maps.cut()),
         }
     }
 
-    /// Chooses the maps for a view, fills what was made meanwhile, and writes the frame's table: before the target begins.
+    /// Is told of a list that is to be drawn: its triangles say which texels of the ground are needed.
+    pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
+        if let Parts::Ground(maps) = &mut self.parts {
+            maps.see(view, resident, list);
+        }
+    }
+
+    /// Chooses the parts for a view, fills what was made meanwhile, and writes the frame's table: before the target begins.
     pub fn look(&mut self, recording: &mut Recording, view: &View) -> Result<()> {
-        let Some(maps) = &mut self.maps else { return Ok(()) };
-        let fills = maps.look(view, self.slots.most_fills());
+        let most = self.slots.most_fills();
+        let fills = match &mut self.parts {
+            Parts::None => return Ok(()),
+            Parts::Picture(maps) => maps.look(view, most),
+            Parts::Ground(maps) => maps.look(most),
+        };
         self.slots.fill(recording, &fills)?;
-        self.tables[recording.slot].write(0, bytemuck::cast_slice(maps.table()));
+        if let Some(table) = self.parts.table() {
+            self.tables[recording.slot].write(0, bytemuck::cast_slice(table));
+        }
         Ok(())
     }
 
-    /// Goes on until all that a view needs is there. Nothing may be under way on the device.
+    /// Goes on until all that a view needs, of the list seen last, is there. Nothing may be under way on the device.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         loop {
             once(gpu, |r| self.look(r, view))?;
-            let Some(maps) = self.maps.as_mut().filter(|maps| maps.figures().waiting > 0) else { return Ok(()) };
-            maps.wait();
+            if self.figures().is_none_or(|figures| figures.waiting == 0) {
+                return Ok(());
+            }
+            match &mut self.parts {
+                Parts::None => {}
+                Parts::Picture(maps) => maps.wait(),
+                Parts::Ground(maps) => maps.wait(),
+            }
         }
     }
 
-    /// What is held, if the picture is there as maps.
+    /// What is held, if something is there in parts.
     pub fn figures(&self) -> Option<Figures> {
-        self.maps.as_ref().map(PictureMaps::figures)
+        match &self.parts {
+            Parts::None => None,
+            Parts::Picture(maps) => Some(maps.figures()),
+            Parts::Ground(maps) => Some(maps.figures()),
+        }
+    }
+}
+
+impl Parts {
+    fn table(&self) -> Option<&[u32]> {
+        match self {
+            Parts::None => None,
+            Parts::Picture(maps) => Some(maps.table()),
+            Parts::Ground(maps) => Some(maps.table().words()),
+        }
     }
 }

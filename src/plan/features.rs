@@ -225,6 +225,15 @@ pub const FEATURES: &[Feature] = &[
         force: Force::Never("it is the memory for a picture that decides: --texture-memory"),
     },
     Feature {
+        name: "ground texels",
+        is_kept: |plan, _| plan.ground.is_some(),
+        kept: "asked for",
+        left_out: "no ground is made where it is seen",
+        by_technique: false,
+        bytes: |plan, _| plan.ground.map_or(0, |cut| cut.bytes()),
+        force: Force::Never("they are asked for with --colour ground"),
+    },
+    Feature {
         name: "wireframe",
         is_kept: |plan, _| plan.wireframe,
         kept: "asked for",

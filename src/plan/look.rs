@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::features::overlay_bytes;
 use super::forced::Forced;
 use crate::draw::layout::Frame;
 use crate::height::Field;
@@ -26,6 +27,17 @@ pub enum Colour {
     Batch = 5,
     /// Which map of the picture, where that is there in parts: its level, and where it ends.
     Maps = 6,
+    /// A ground whose texels are made where they are seen ([`ground`](crate::texture::ground)).
+    Ground = 7,
+    /// Which node of the ground's map serves: its level, and where it ends.
+    Nodes = 8,
+}
+
+impl Colour {
+    /// Whether texels of the ground are needed for it.
+    pub fn shows_ground(self) -> bool {
+        matches!(self, Colour::Ground | Colour::Nodes)
+    }
 }
 
 /// How the land is to look.
@@ -43,7 +55,8 @@ pub struct Look {
     pub detail: bool,
     /// How fast the sun goes on in azimuth, degrees a second.
     pub sun_speed: f64,
-    /// The most bytes for a picture laid over the field: a larger one is there in parts, as fine as a view needs.
+    /// The most bytes for a picture laid over the field, or for the texels of the ground: what is larger is there in parts,
+    /// as fine as a view needs.
     pub texture_bytes: u64,
     /// Features that are kept or left out whatever the scene needs.
     pub forced: Forced,
@@ -65,6 +78,11 @@ impl Default for Look {
 }
 
 impl Look {
+    /// Whether a picture of so many texels is within its bytes.
+    pub fn holds(&self, size: [u32; 2]) -> bool {
+        overlay_bytes(size) <= self.texture_bytes
+    }
+
     /// The look so many seconds later.
     pub fn after(&self, seconds: f64) -> Look {
         let [azimuth, altitude] = self.sun;

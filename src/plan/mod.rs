@@ -7,6 +7,7 @@ mod look;
 
 use crate::draw::{Draws, Hiding, Manner};
 use crate::height::{Field, Samples};
+use crate::texture::ground_maps::GroundCut;
 use crate::texture::picture_maps::Cut;
 pub use features::{FEATURES, Feature};
 pub use forced::Forced;
@@ -60,6 +61,8 @@ pub struct ScenePlan {
     pub overlay: Option<[u32; 2]>,
     /// How it is cut where it is there in parts.
     pub maps: Option<Cut>,
+    /// How texels of the ground are kept, if they are asked for.
+    pub ground: Option<GroundCut>,
     /// What was kept and left out by hand.
     pub forced: Forced,
 }
@@ -76,7 +79,8 @@ pub struct Decision {
 }
 
 impl ScenePlan {
-    /// The plan for a field and a look, or which limit of the device the field exceeds.
+    /// The plan for a field and a look, or which limit of the device the field exceeds, or that its bytes do not hold the
+    /// few parts of the ground that there must be.
     pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
         let (stored, is_endless) = (field.stored(), field.land().is_some());
         let page_shift = if stored.iter().all(|&n| n <= device.image_side) { 0 } else { device.image_side.ilog2() };
@@ -99,9 +103,13 @@ impl ScenePlan {
             stored,
             overlay: None,
             maps: None,
+            ground: None,
             forced: look.forced,
         };
         plan.force();
+        if look.colour.shows_ground() {
+            plan.ground = Some(GroundCut::new(field, look.texture_bytes, device.image_layers)?);
+        }
         let layers = plan.pages()[0] * plan.pages()[1];
         if layers > device.image_layers {
             return Err(format!(
@@ -160,14 +168,17 @@ impl ScenePlan {
         overlay: Option<[u32; 2]>,
     ) -> Result<Self, String> {
         self.overlay = overlay;
-        let is_whole = |size: &[u32; 2]| {
-            features::overlay_bytes(*size) <= look.texture_bytes && size.iter().all(|&n| n <= device.image_side)
-        };
+        let is_whole = |size: &[u32; 2]| look.holds(*size) && size.iter().all(|&n| n <= device.image_side);
         if let Some(size) = overlay.filter(|size| field.land().is_none() && !is_whole(size)) {
             let last = field.size().map(|n| n - 1);
             self.maps = Some(Cut::new(last, size, look.texture_bytes, device.image_layers)?);
         }
         Ok(self)
+    }
+
+    /// Whether what is drawn is looked at on the host first: its triangles say which texels the ground needs.
+    pub fn reads_lists(&self) -> bool {
+        self.ground.is_some()
     }
 
     /// Whether pictures need a depth buffer.

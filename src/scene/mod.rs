@@ -86,7 +86,7 @@ pub struct Shot {
     pub times: Times,
     /// Device bytes in use while it was drawn.
     pub device_bytes: u64,
-    /// The maps of the picture laid over, where it is there in parts.
+    /// The texels laid over in parts, if any are.
     pub maps: Option<Figures>,
 }
 
@@ -133,7 +133,7 @@ impl<'a> Scene<'a> {
     pub fn shoot(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
         let mut stage = self.stage(technique, view.size)?;
         // Before anything is timed: a picture does not depend on how fast maps are made.
-        stage.settle(view)?;
+        stage.settle(technique, view)?;
         let drawn = (0..times.max(1)).map(|_| stage.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().values().sum();
         stage.complete()?;
@@ -143,12 +143,15 @@ impl<'a> Scene<'a> {
 }
 
 impl Stage {
-    /// Waits until the maps of the picture laid over are as fine as a view needs.
-    pub fn settle(&mut self, view: &View) -> Result<()> {
+    /// Waits until the texels laid over in parts are as fine as a view needs.
+    pub fn settle(&mut self, technique: &mut dyn Technique, view: &View) -> Result<()> {
+        if self.plan.reads_lists() {
+            self.select(technique, view);
+        }
         self.terrain.overlay.settle(&self.gpu, view)
     }
 
-    /// What the maps of the picture laid over hold, where it is there in parts.
+    /// What is held of the texels laid over in parts, if any are.
     pub fn maps(&self) -> Option<Figures> {
         self.terrain.overlay.figures()
     }
@@ -187,16 +190,17 @@ impl Stage {
         Ok(Times { frame_ms, select_ms, upload_ms, record_ms, gpu })
     }
 
-    /// Selects on the device if that can and nothing else is asked for.
+    /// Selects on the device if that can and nothing else is asked for; and shows the list to what is laid over in parts.
     fn select(&mut self, technique: &mut dyn Technique, view: &View) {
         self.list.clear();
         let own = self.submission.unwrap_or(Submission::Driven);
-        if own == Submission::Driven && self.terrain.driven().is_some() {
+        if own == Submission::Driven && self.terrain.driven().is_some() && !self.plan.reads_lists() {
             technique.drive(view, &mut self.list);
         } else {
             technique.select(view, &mut self.list);
             self.list.submission = self.submission.unwrap_or(self.list.submission);
         }
+        self.terrain.overlay.see(view, technique.resident(), &self.list);
     }
 
     /// The draws that the device found itself, once the frame has finished.

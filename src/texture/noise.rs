@@ -1,4 +1,4 @@
-//! Noise that repeats: functions over the unit square whose opposite edges meet. Additions, multiplications and
+//! Noise: functions over the unit square whose opposite edges meet, and over the plane. Additions, multiplications and
 //! square roots only, which every machine rounds alike.
 
 /// A whole number's bits mixed up, as a number from 0 up to 1.
@@ -19,8 +19,20 @@ fn faded(t: f32) -> f32 {
 pub fn values(p: [f32; 2], cells: i32, seed: u32) -> f32 {
     let [x, y] = p.map(|n| n * cells as f32);
     let (i, j) = (x.floor(), y.floor());
-    let [u, v] = [faded(x - i), faded(y - j)];
     let at = |di: i32, dj: i32| hashed((i as i32 + di).rem_euclid(cells), (j as i32 + dj).rem_euclid(cells), seed);
+    between([x - i, y - j], at)
+}
+
+/// The same over the plane, its lattice 1 apart, up to 2^31 from the middle.
+pub fn open_values(p: [f64; 2], seed: u32) -> f32 {
+    let [i, j] = p.map(f64::floor);
+    let at = |di: i32, dj: i32| hashed((i as i32).wrapping_add(di), (j as i32).wrapping_add(dj), seed);
+    between([(p[0] - i) as f32, (p[1] - j) as f32], at)
+}
+
+/// Between the values at four corners.
+fn between(inside: [f32; 2], at: impl Fn(i32, i32) -> f32) -> f32 {
+    let [u, v] = inside.map(faded);
     let row = |dj: i32| at(0, dj) + (at(1, dj) - at(0, dj)) * u;
     row(0) + (row(1) - row(0)) * v
 }
@@ -36,7 +48,7 @@ pub fn octaves(p: [f32; 2], cells: i32, count: u32, seed: u32) -> f32 {
     sum / whole
 }
 
-/// One random point in each of `cells` × `cells` cells (Worley 1996).
+/// One random point in each cell (Worley 1996).
 pub struct Nearest {
     /// Distance to the nearest point, in cells.
     pub first: f32,
@@ -46,15 +58,27 @@ pub struct Nearest {
     pub own: f32,
 }
 
-/// The points nearest a place.
+/// The points nearest a place, one in each of `cells` × `cells` cells.
 pub fn nearest(p: [f32; 2], cells: i32, seed: u32) -> Nearest {
-    let [x, y] = p.map(|n| n * cells as f32);
-    let [i, j] = [x.floor() as i32, y.floor() as i32];
+    let place = p.map(|n| n * cells as f32);
+    nearest_of(place, place.map(|n| n.floor() as i32), seed, |cell| cell.map(|n| n.rem_euclid(cells)))
+}
+
+/// The same over the plane, cells 1 wide, up to 2^31 from the middle.
+pub fn open_nearest(p: [f64; 2], seed: u32) -> Nearest {
+    let first = p.map(f64::floor);
+    let inside = [0, 1].map(|k| (p[k] - first[k]) as f32);
+    nearest_of(inside, [0; 2], seed, |cell| [0, 1].map(|k| (first[k] as i32).wrapping_add(cell[k])))
+}
+
+/// Of a place in a cell; `named` says which cell one is.
+fn nearest_of(place: [f32; 2], first: [i32; 2], seed: u32, named: impl Fn([i32; 2]) -> [i32; 2]) -> Nearest {
     let mut found = Nearest { first: f32::MAX, second: f32::MAX, own: 0.0 };
     for (di, dj) in (-1..=1).flat_map(|dj| (-1..=1).map(move |di| (di, dj))) {
-        let cell = [(i + di).rem_euclid(cells), (j + dj).rem_euclid(cells)];
-        let point = [0, 1].map(|k| hashed(cell[0], cell[1], seed.wrapping_add(k)));
-        let [dx, dy] = [(i + di) as f32 + point[0] - x, (j + dj) as f32 + point[1] - y];
+        let here = [first[0] + di, first[1] + dj];
+        let cell = named(here);
+        let point = [0, 1].map(|k: u32| hashed(cell[0], cell[1], seed.wrapping_add(k)));
+        let [dx, dy] = [0, 1].map(|k: usize| here[k] as f32 + point[k] - place[k]);
         let distance = (dx * dx + dy * dy).sqrt();
         if distance < found.first {
             let own = hashed(cell[0], cell[1], seed.wrapping_add(2));

@@ -24,9 +24,9 @@ pub struct Wedge {
     pub corners: [Corner; 3],
 }
 
-/// Side of the root square of a field, samples.
+/// Side of the root square of a field, samples: a power of two, 2 at least.
 pub fn root_side(field: &Field) -> u32 {
-    field.size().into_iter().map(|n| n - 1).max().unwrap_or(1).next_power_of_two()
+    field.size().into_iter().map(|n| n - 1).max().unwrap_or(2).next_power_of_two().max(2)
 }
 
 /// The triangles of a draw list that face the eye, as wedges. Those that end at the field's edge, where a wedge sticks

@@ -105,7 +105,7 @@ impl Session {
                 return Request::Look;
             }
             Action::Colour => {
-                self.look.colour = next_colour(self.look.colour, setup.overlay.is_some());
+                self.look.colour = next_colour(self.look.colour, Picture::of(setup));
                 self.plain = if self.look.colour == Colour::Level { self.plain } else { self.look.colour };
                 return Request::Look;
             }
@@ -224,7 +224,7 @@ impl Session {
             row("position", format!("{x:.0} {y:.0} {z:.0} m")),
             row("above ground", format!("{:.1} m", self.camera.above_ground(&setup.field))),
         ];
-        rows.extend(figures.maps.map(|maps| row("texture maps", maps.to_string())));
+        rows.extend(figures.maps.map(|maps| row("texels", maps.to_string())));
         rows
     }
 }
@@ -240,11 +240,31 @@ pub fn free_path() -> PathBuf {
     path((1..).find(|k| !path(*k).exists()).unwrap_or(0))
 }
 
-fn next_colour(colour: Colour, has_overlay: bool) -> Colour {
+/// The picture there is to lay over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Picture {
+    None,
+    Whole,
+    InParts,
+}
+
+impl Picture {
+    fn of(setup: &Setup) -> Self {
+        match &setup.overlay {
+            None => Picture::None,
+            Some(picture) if setup.look.holds(picture.dimensions().into()) => Picture::Whole,
+            Some(_) => Picture::InParts,
+        }
+    }
+}
+
+fn next_colour(colour: Colour, picture: Picture) -> Colour {
     match colour {
-        Colour::Height if has_overlay => Colour::Overlay,
-        Colour::Overlay => Colour::Maps,
-        Colour::Height | Colour::Maps => Colour::Level,
+        Colour::Height if picture != Picture::None => Colour::Overlay,
+        Colour::Overlay if picture == Picture::InParts => Colour::Maps,
+        Colour::Height | Colour::Overlay | Colour::Maps => Colour::Ground,
+        Colour::Ground => Colour::Nodes,
+        Colour::Nodes => Colour::Level,
         Colour::Level => Colour::Error,
         Colour::Error => Colour::Normal,
         Colour::Normal => Colour::Batch,
@@ -257,6 +277,8 @@ fn colour_name(colour: Colour) -> &'static str {
         Colour::Height => "height",
         Colour::Overlay => "overlay",
         Colour::Maps => "maps",
+        Colour::Ground => "ground",
+        Colour::Nodes => "nodes",
         Colour::Level => "level",
         Colour::Error => "error",
         Colour::Normal => "normal",
@@ -281,13 +303,14 @@ mod tests {
 
     #[test]
     fn colours_come_round() {
-        for has_overlay in [false, true] {
+        for (count, picture) in (8..).zip([Picture::None, Picture::Whole, Picture::InParts]) {
             let mut seen = vec![Colour::Height];
-            while seen.len() < 10 && (seen.len() == 1 || seen.last() != Some(&Colour::Height)) {
-                seen.push(next_colour(seen[seen.len() - 1], has_overlay));
+            while seen.len() < 12 && (seen.len() == 1 || seen.last() != Some(&Colour::Height)) {
+                seen.push(next_colour(seen[seen.len() - 1], picture));
             }
-            assert_eq!(seen.len(), 6 + 2 * usize::from(has_overlay));
-            assert_eq!(seen.contains(&Colour::Overlay), has_overlay);
+            assert_eq!(seen.len(), count);
+            assert_eq!(seen.contains(&Colour::Overlay), picture != Picture::None);
+            assert_eq!(seen.contains(&Colour::Maps), picture == Picture::InParts);
         }
     }
 

@@ -28,6 +28,8 @@ pub struct Stage {
     technique: Box<dyn Technique>,
     list: DrawList,
     range: [f32; 2],
+    /// Whether lists are looked at on the host before they are drawn.
+    reads_lists: bool,
     /// What the last frame took and held.
     pub figures: Figures,
 }
@@ -49,7 +51,7 @@ pub struct Figures {
     pub widening: f64,
     /// Error allowed, pixels.
     pub tolerance_px: f64,
-    /// The maps of the picture laid over, where it is there in parts.
+    /// The texels laid over in parts, if any are.
     pub maps: Option<picture_maps::Figures>,
 }
 
@@ -98,6 +100,7 @@ impl Stage {
             technique,
             list: DrawList::default(),
             range: setup.field.range(),
+            reads_lists: plan.reads_lists(),
             figures: Figures::default(),
             gpu,
         })
@@ -108,7 +111,7 @@ impl Stage {
         &self.gpu.candidate.name
     }
 
-    /// Changes the look: pipelines only.
+    /// Changes the look: pipelines, and what is laid over in parts.
     pub fn set_look(&mut self, setup: &Setup, look: &Look) -> Result<()> {
         let plan = plan(&self.gpu, setup, look, self.technique.as_ref())?;
         let before = self.swapchain.formats();
@@ -117,7 +120,8 @@ impl Stage {
         if formats != before {
             self.hud.reformat(formats)?;
         }
-        self.terrain.replan(&plan, formats)
+        self.reads_lists = plan.reads_lists();
+        self.terrain.replan(&plan, &setup.field, setup.overlay.as_ref(), formats)
     }
 
     /// Changes the technique: its geometry, the slots' room, and pipelines for what it needs.
@@ -151,11 +155,12 @@ impl Stage {
             self.list.uploads.clear();
         } else {
             // Where there is too much for the device the host widens the tolerance until it fits.
-            let is_driven = self.terrain.driven().is_some() && self.list.widening == 1.0;
+            let is_driven = self.terrain.driven().is_some() && self.list.widening == 1.0 && !self.reads_lists;
             self.list.clear();
             let select = if is_driven { <dyn Technique>::drive } else { <dyn Technique>::select };
             select(self.technique.as_mut(), shot.view, &mut self.list);
         }
+        self.terrain.overlay.see(shot.view, self.technique.resident(), &self.list);
         self.figures.select_ms = ms(started);
         // Draws that the device finds are those of a frame before, which has finished.
         if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {

@@ -30,12 +30,12 @@ fn flight(field: &Field, frames: usize, px: f64) -> Vec<View> {
     paths::find("cave").expect("a named path").views(field, frames, [240, 160], tolerance)
 }
 
-fn plan(gpu: &Gpu, field: &Field, look: &Look) -> ScenePlan {
-    ScenePlan::new(field, look, &gpu.device_limits()).unwrap()
+fn plan(gpu: &Gpu, field: &Field, look: &Look, technique: &dyn Technique) -> ScenePlan {
+    ScenePlan::new(field, look, &gpu.device_limits()).unwrap().with_manner(technique.manner())
 }
 
 fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Technique, view: &View) -> Stage {
-    let plan = plan(gpu, field, look);
+    let plan = plan(gpu, field, look, technique);
     Scene { gpu, field, plan: &plan, look, overlay: None }.stage(technique, view.size).unwrap()
 }
 
@@ -74,7 +74,7 @@ fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
     on_device(|gpu| {
         let (field, look) = (cave(), Look::default());
         let mut technique = technique(&field, "sorted-strips", &[]);
-        let plan = plan(gpu, &field, &look);
+        let plan = plan(gpu, &field, &look, technique.as_ref());
         let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
         for (k, view) in flight(&field, 8, 1.0).iter().enumerate() {
             let shot = scene.shoot(technique.as_mut(), view, 1).unwrap();
@@ -149,6 +149,6 @@ fn a_ceiling_is_there_only_where_it_is_needed() {
         assert!(bytes(&cave) >= 4 * 257 * 193);
         let alone = Arc::new(synth(Kind::CaveFloor, [257, 193], 7));
         assert_eq!(bytes(&alone), 0);
-        assert!(!plan(gpu, &alone, &Look::default()).ceiling);
+        assert!(!ScenePlan::new(&alone, &Look::default(), &gpu.device_limits()).unwrap().ceiling);
     });
 }

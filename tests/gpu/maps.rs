@@ -89,7 +89,7 @@ fn maps_show_the_picture_without_seams() {
         let view = above(&field, field.world_at(63.0, 47.0, 9000.0), 2.0);
         let whole = drawn(&mut stage(gpu, &field, &picture, WHOLE, &view), &field, &view);
         let mut parts = stage(gpu, &field, &picture, PARTS, &view);
-        parts.settle(&view).unwrap();
+        parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &view).unwrap();
         let in_parts = drawn(&mut parts, &field, &view);
         let maps = parts.maps().expect("in parts");
         assert!(maps.waiting == 0 && maps.texel_px == 1.0 && maps.bytes <= PARTS, "{maps}");
@@ -118,14 +118,14 @@ fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
         let mut parts = stage(gpu, &field, &picture, PARTS, &view);
         let first = drawn(&mut parts, &field, &near);
         assert!(parts.maps().unwrap().waiting > 0);
-        parts.settle(&near).unwrap();
+        parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &near).unwrap();
         let settled = drawn(&mut parts, &field, &near);
         assert!(difference(&first, &settled, 8).1 > 0.5, "the root alone shows waves of a dozen texels");
         assert!(first.pixels().all(|pixel| pixel.0[3] == 255), "land is drawn at once");
-        parts.settle(&view).unwrap();
+        parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &view).unwrap();
         let aslant = drawn(&mut parts, &field, &view);
         assert!(difference(&aslant, &settled, 8).1 > 0.1);
-        parts.settle(&near).unwrap();
+        parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &near).unwrap();
         assert_eq!(drawn(&mut parts, &field, &near), settled);
     });
 }

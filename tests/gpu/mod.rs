@@ -8,6 +8,7 @@ mod detail;
 mod driven;
 mod endless;
 mod golden;
+mod ground;
 mod holes;
 mod layout;
 mod loss;

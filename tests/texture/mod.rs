@@ -1,5 +1,7 @@
 //! The texture working set along a flight: how large it is, and whether spheres find the same one.
 
+mod ground;
+
 use std::collections::HashMap;
 use std::sync::Arc;
 

@@ -25,7 +25,7 @@ use super::shapes::Shapes;
 use super::splits::Splits;
 use super::walk::{Ground, Stream, Worker};
 use super::{ENTRY, MOST_PAGES, MOST_TRIANGLES, join_streams};
-use crate::draw::{Draw, DrawList, ExplicitVertex, Geometry, Instance, Limits, Source, Topology};
+use crate::draw::{Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::lod::{Settings, Technique, widened};
@@ -178,6 +178,10 @@ impl Technique for CaveStrips {
         let fits = |wider: &View| (self.split(wider) && self.walk(wider, &gaze, &rows)).then_some(());
         list.widening = widened(view, fits).1;
         self.fill(rows.len(), list);
+    }
+
+    fn manner(&self) -> Manner {
+        Manner { draws: Draws::EXPLICIT, ..Manner::default() }
     }
 
     fn keeps_tolerance(&self) -> bool {

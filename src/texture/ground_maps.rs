@@ -1,0 +1,157 @@
+//! The working set of a ground's texels on the device: which nodes of its map a frame's wedges need, which of them are there,
+//! and the table in which a fragment finds its own.
+//!
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part I. The wedges of the list say what is needed
+//! ([`wedges`]), each node's texture has the same size and lies in a slot, and texels are made on workers
+//! while the nearest coarser node that is there serves ([`Slots`]). The paper tells each triangle its texture; here a
+//! fragment goes down a table of the nodes that serve ([`NodeTable`]), so that any technique's triangles will do, and a
+//! fragment may find a finer node than its wedge asked for.
+
+use std::sync::Arc;
+
+use super::ground::Ground;
+use super::node_table::NodeTable;
+use super::picture_maps::Figures;
+use super::pieces::Cutter;
+use super::slots::{Fill, Slots};
+use super::wedges::{self, root_side};
+use super::working_set::{Node, Stop, WorkingSet};
+use crate::draw::{DrawList, Geometry};
+use crate::height::Field;
+use crate::view::View;
+
+/// Level of a node's texture, and cells along its side.
+const SLOT_LEVEL: i32 = 6;
+const CELLS: u32 = 1 << SLOT_LEVEL;
+/// Level of the whole map: 2^36 texels.
+const MAP_LEVEL: i32 = 18;
+/// The least slots kept.
+const LEAST_SLOTS: u64 = 64;
+/// The most: no screen needs more.
+const MOST_SLOTS: u64 = 4096;
+/// Slots that serve for nodes that are to come: the root, and some coarser ones.
+const SPARE: u32 = 16;
+
+/// How a ground's map is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroundCut {
+    /// Samples along a side of the root square, as a power of two, 1 to 31.
+    pub root_shift: u32,
+    /// Nodes kept.
+    pub slots: u32,
+}
+
+impl GroundCut {
+    /// For a field, a number of bytes, and at most `most_slots` nodes.
+    ///
+    /// # Errors
+    /// If the bytes do not hold the few nodes that there must be.
+    pub fn new(field: &Field, budget_bytes: u64, most_slots: u32) -> Result<Self, String> {
+        let tile = Self::tile_bytes();
+        let slots = (budget_bytes / tile).min(u64::from(most_slots)).min(MOST_SLOTS);
+        if slots < LEAST_SLOTS {
+            let needed = (LEAST_SLOTS * tile).div_ceil(1_000_000);
+            return Err(format!("texture memory of {} MB: expected at least {needed} MB", budget_bytes / 1_000_000));
+        }
+        Ok(Self { root_shift: root_side(field).ilog2(), slots: slots as u32 })
+    }
+
+    /// Texels along a side of a node's texture.
+    pub fn tile_side() -> u32 {
+        CELLS + 1
+    }
+
+    /// Bytes of a node's texture.
+    pub fn tile_bytes() -> u64 {
+        4 * u64::from(CELLS + 1).pow(2)
+    }
+
+    /// Bytes of all slots.
+    pub fn bytes(&self) -> u64 {
+        u64::from(self.slots) * Self::tile_bytes()
+    }
+
+    /// Level of the whole map: 18, or more where samples are closer than its texels.
+    fn map_level(&self) -> i32 {
+        MAP_LEVEL.max(self.root_shift as i32)
+    }
+
+    /// The most words of a frame's table.
+    pub fn table_words(&self) -> usize {
+        NodeTable::most_words(self.slots as usize, (self.map_level() - SLOT_LEVEL) as u32)
+    }
+}
+
+/// The working set.
+pub struct GroundMaps {
+    field: Arc<Field>,
+    cut: GroundCut,
+    set: WorkingSet,
+    slots: Slots,
+    table: NodeTable,
+    /// Texels a pixel along an axis.
+    quality: f64,
+}
+
+impl GroundMaps {
+    /// For a field.
+    pub fn new(field: &Arc<Field>, cut: GroundCut) -> Self {
+        let ground = Ground::new(field);
+        let slots = Slots::new(cut.slots, Arc::new(move |node: Node| ground.tile(node, CELLS)));
+        let set = WorkingSet::new(cut.map_level(), Stop::Largest(SLOT_LEVEL));
+        Self { field: Arc::clone(field), cut, set, slots, table: NodeTable::new(), quality: 1.0 }
+    }
+
+    /// How it is kept.
+    pub fn cut(&self) -> &GroundCut {
+        &self.cut
+    }
+
+    /// Works out which nodes a list's wedges need: a texel a pixel, or as many as there is room for.
+    pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
+        let wedges = wedges::of_list(&self.field, view, resident, list);
+        self.quality = 1.0;
+        loop {
+            let cutter = Cutter::new(view, self.quality, self.cut.map_level(), SLOT_LEVEL);
+            wedges::show(&mut self.set, view, cutter, &wedges);
+            if self.set.nodes().count() <= (self.cut.slots - SPARE) as usize {
+                return;
+            }
+            self.quality *= std::f64::consts::FRAC_1_SQRT_2;
+        }
+    }
+
+    /// Chooses what they are drawn with; what is to be filled in before, at most so many nodes.
+    pub fn look(&mut self, most_fills: usize) -> Vec<Fill> {
+        let fills = self.slots.begin(most_fills);
+        self.table.clear();
+        for (node, _) in self.set.nodes() {
+            self.table.enter(&self.slots.serve(node));
+        }
+        self.slots.finish();
+        fills
+    }
+
+    /// The nodes that serve since the last look.
+    pub fn table(&self) -> &NodeTable {
+        &self.table
+    }
+
+    /// Texels that the wedges seen last need.
+    pub fn texels(&self) -> f64 {
+        self.set.texels()
+    }
+
+    /// Waits until all that was asked for is made.
+    pub fn wait(&mut self) {
+        self.slots.wait();
+    }
+
+    /// What it holds since the last look.
+    pub fn figures(&self) -> Figures {
+        let held = self.slots.held();
+        let bytes = held as u64 * GroundCut::tile_bytes();
+        let (slots, waiting) = (self.cut.slots as usize, self.slots.waiting());
+        Figures { slots, held, bytes, waiting, texel_px: 1.0 / self.quality }
+    }
+}
