@@ -120,6 +120,25 @@ fn without_a_subcommand_and_a_display_a_picture_is_drawn() {
 }
 
 #[test]
+fn texture_memory_is_kept_to_or_refused() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    image::RgbaImage::new(1024, 1024).save(folder.path().join("large.png")).unwrap();
+    let view = ["render", "demo", "-o", "p.png", "--size", "64x36", "--texture-memory", "1"];
+    let refused = cuesta(folder.path(), &[&view[..], &["--colour", "ground"]].concat());
+    assert_eq!(code(&refused), 2);
+    assert_eq!(stderr(&refused), "error: texture memory of 1 MB: expected at least 2 MB\n");
+    assert!(!folder.path().join("p.png").exists());
+    // 4 MB of texels: in parts, and a picture all the same.
+    let rendered = json(folder.path(), &[&view[..], &["--overlay", "large.png"]].concat());
+    assert!(rendered["texture_maps"]["bytes"].as_u64().unwrap() <= 1_000_000, "{rendered}");
+    let rendered = json(folder.path(), &["render", "demo", "-o", "p.png", "--size", "64x36", "--colour", "ground"]);
+    assert_eq!(rendered["texture_maps"]["waiting"], 0);
+}
+
+#[test]
 fn what_the_device_cannot_do_is_named() {
     if !has_device() {
         return;
