@@ -127,9 +127,7 @@ fn texture_memory_is_kept_to_or_refused() {
     let folder = folder();
     image::RgbaImage::new(1024, 1024).save(folder.path().join("large.png")).unwrap();
     let view = ["render", "demo", "-o", "p.png", "--size", "64x36", "--texture-memory", "1"];
-    let refused = cuesta(folder.path(), &[&view[..], &["--colour", "ground"]].concat());
-    assert_eq!(code(&refused), 2);
-    assert_eq!(stderr(&refused), "error: texture memory of 1 MB: expected at least 2 MB\n");
+    refused(folder.path(), &[&view[..], &["--colour", "ground"]].concat(), &["1 MB: expected at least 2 MB"]);
     assert!(!folder.path().join("p.png").exists());
     // 4 MB of texels: in parts, and a picture all the same.
     let rendered = json(folder.path(), &[&view[..], &["--overlay", "large.png"]].concat());

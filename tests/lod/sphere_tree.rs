@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
+use cuesta::draw::layout::Frame;
+use cuesta::draw::{DrawList, ExplicitVertex, Geometry, Source, Upload, expand};
 use cuesta::height::synth::{self, Kind};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::sphere_tree::covers::Covers;
@@ -248,4 +249,53 @@ fn what_is_held_does_not_switch_to_and_fro() {
     };
     assert!(switches("hold=off") > 30);
     assert!(switches("hold=on") <= 1);
+}
+
+/// Overwrites what a device has as it would.
+fn apply(uploads: &[Upload], device: &mut Geometry) {
+    for upload in uploads {
+        match upload {
+            Upload::Vertices(first, v) => device.vertices[*first as usize..][..v.len()].copy_from_slice(v),
+            Upload::Normals(first, n) => device.normals[*first as usize..][..n.len()].copy_from_slice(n),
+            Upload::Indices(first, i) => device.indices[*first as usize..][..i.len()].copy_from_slice(i),
+        }
+    }
+}
+
+/// The triangles that a device draws which has had all uploads so far; they, and the bytes sent for them.
+fn drawn_on(device: &mut Geometry, field: &Field, view: &View, list: &DrawList) -> (Vec<[[i64; 3]; 3]>, usize) {
+    apply(&list.uploads, device);
+    let triangles = expand::triangles(field, &Frame::placing(field, view), device, list);
+    let corners = |t: &expand::Drawn| t.corners.map(|c| [i64::from(c.x), i64::from(c.z), i64::from(c.y.to_bits())]);
+    let mut corners: Vec<_> = triangles.iter().map(corners).collect();
+    corners.sort_unstable();
+    let size = list.size();
+    (corners, size.upload_bytes + size.vertices * size_of::<ExplicitVertex>() + size.indices * 4)
+}
+
+/// Patches on the device, sent when they change: at every step of a walk the triangles that are streamed otherwise.
+#[test]
+fn patches_draw_what_is_streamed_otherwise() {
+    let field = land([300, 260]);
+    for (morph, least_saving) in [("morph=off", 5.0), ("morph=on", 0.9)] {
+        let mut rooms = ["patches=streamed", "patches=resident"]
+            .map(|patches| super::technique(&field, "sphere-tree", &[morph, patches]));
+        let mut devices = rooms.each_ref().map(|room| room.resident().clone());
+        let (mut sent, mut resident_draws) = ([0; 2], 0);
+        for (eye, px) in walk(&field, 300, 17) {
+            let view = view(eye, px);
+            let drawn = [0, 1].map(|k| {
+                let mut list = DrawList::default();
+                rooms[k].select(&view, &mut list);
+                let (triangles, bytes) = drawn_on(&mut devices[k], &field, &view, &list);
+                sent[k] += bytes;
+                resident_draws += list.draws.iter().filter(|draw| draw.source == Source::Resident).count();
+                triangles
+            });
+            assert!(drawn[0] == drawn[1], "{morph} at {eye}");
+        }
+        println!("{morph}: {} B streamed, {} B for patches in {resident_draws} draws", sent[0], sent[1]);
+        assert!(resident_draws > 1000);
+        assert!(sent[0] as f64 > least_saving * sent[1] as f64, "{morph}: {sent:?} bytes");
+    }
 }

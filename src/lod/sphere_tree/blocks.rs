@@ -57,6 +57,17 @@ impl Blocks {
         (i < self.count[0] && j < self.count[1] && self.seen[block]).then_some(block)
     }
 
+    /// Whether a block may be in sight.
+    pub fn is_seen(&self, block: usize) -> bool {
+        self.seen[block]
+    }
+
+    /// Sees these blocks only.
+    #[cfg(test)]
+    pub fn see(&mut self, blocks: &[usize]) {
+        self.seen.iter_mut().enumerate().for_each(|(block, seen)| *seen = blocks.contains(&block));
+    }
+
     /// The number of blocks.
     pub fn number(&self) -> usize {
         self.bounds.len()

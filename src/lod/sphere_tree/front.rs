@@ -10,7 +10,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use super::lattice::Place;
 use super::measure::{Known, Measured};
 use super::reach::Viewpoint;
-use super::splits::{Found, Splits};
+use super::splits::{Changes, Found, Splits};
 
 /// A place in the front at one time: index of the diamond and when it got its watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -115,6 +115,11 @@ impl<W: Watch> Follower<W> {
     /// What has split.
     pub fn splits(&self) -> &Splits {
         &self.splits
+    }
+
+    /// What has split or merged since the last call.
+    pub fn changes(&mut self) -> Changes {
+        self.splits.changes()
     }
 
     /// Who looks after the front.
@@ -239,7 +244,7 @@ impl<W: Watch> Follower<W> {
 
     fn split(&mut self, measured: &Measured, from: &Viewpoint, at: Place, index: usize) {
         self.remove(index);
-        self.splits.insert(index);
+        self.splits.insert(at, index);
         self.add(at, index, true);
         measured.lattice.parents(at).for_each(|(_, parent)| self.remove(parent));
         measured.lattice.children(at).for_each(|(at, _)| self.add_if_ready(measured, from, Some(at)));
@@ -247,7 +252,7 @@ impl<W: Watch> Follower<W> {
 
     fn merge(&mut self, measured: &Measured, from: &Viewpoint, at: Place, index: usize) {
         self.remove(index);
-        self.splits.remove(index);
+        self.splits.remove(at, index);
         measured.lattice.children(at).for_each(|(_, child)| self.remove(child));
         self.add_if_ready(measured, from, Some(at));
         for (at, parent) in measured.lattice.parents(at) {

@@ -6,11 +6,14 @@
 //! these is conforming and holds all diamonds that must have split, so that each keeps the tolerance, and so does their
 //! mean. Where a vertex comes or goes, w is 1 and the surface the same with and without it.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use super::lattice::{Lattice, Place};
 use super::measure::Measured;
+use super::patches::Patches;
 use super::reach::Viewpoint;
 use super::splits::Splits;
 use crate::draw::{Draw, DrawList, ExplicitVertex, Instance, Source, Topology};
@@ -73,18 +76,36 @@ pub struct Mesh<'a> {
 }
 
 impl Mesh<'_> {
-    /// Fills an empty list: a draw for the wedges larger than a block, and one for each block in sight.
-    pub fn fill(&self, list: &mut DrawList) {
+    /// Fills an empty list: a draw for the wedges larger than a block, and one for each block in sight, from its patch
+    /// where there are any.
+    pub fn fill(&self, mut patches: Option<&mut Patches>, list: &mut DrawList) {
         let (mut large, mut small) = (Vec::new(), Vec::new());
         for wedge in self.roots() {
             self.descend(&wedge, &mut large, &mut small);
         }
         small.sort_by_key(|(block, _)| *block);
         let blocks: Vec<_> = small.chunk_by(|a, b| a.0 == b.0).collect();
-        let of_block = |wedges: &&[(usize, Wedge)]| self.piece(wedges.iter().map(|(_, wedge)| wedge));
-        let pieces: Vec<Piece> = blocks.par_iter().map(of_block).collect();
+        let roots = |wedges: &[(usize, Wedge)]| -> Vec<_> {
+            wedges.iter().map(|(_, wedge)| wedge.map(|corner| corner.at)).collect()
+        };
+        let patch = |patches: &Option<&mut Patches>, wedges: &[(usize, Wedge)]| {
+            patches.as_ref().and_then(|patches| patches.of(wedges[0].0, &roots(wedges)))
+        };
+        let changed: Vec<_> = blocks.iter().filter(|wedges| patch(&patches, wedges).is_none()).collect();
+        let of_block = |wedges: &&&[(usize, Wedge)]| self.piece(wedges.iter().map(|(_, wedge)| wedge));
+        let pieces: Vec<Piece> = changed.par_iter().map(of_block).collect();
         push(list, self.loose(&large));
-        pieces.into_iter().for_each(|piece| push(list, piece));
+        for (wedges, piece) in changed.into_iter().zip(pieces) {
+            let keep = |patches: &mut &mut Patches| {
+                patches.keep((wedges[0].0, roots(wedges)), &piece, self.blocks, &mut list.uploads)
+            };
+            if !patches.as_mut().is_some_and(keep) {
+                push(list, piece);
+            }
+        }
+        for (first_vertex, indices) in blocks.iter().filter_map(|wedges| patch(&patches, wedges)) {
+            push_draw(list, Source::Resident, first_vertex, indices);
+        }
     }
 
     /// The two halves of the root square.
@@ -200,19 +221,17 @@ impl Mesh<'_> {
 
 /// Adds a draw of a piece, if it has triangles.
 pub fn push(list: &mut DrawList, piece: Piece) {
-    if piece.indices.is_empty() {
-        return;
-    }
     let (first_vertex, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
-    let batch = list.instances.len() as u32;
     list.streamed.vertices.extend(piece.vertices);
     list.streamed.indices.extend(piece.indices);
+    push_draw(list, Source::Streamed, first_vertex, first..list.streamed.indices.len() as u32);
+}
+
+fn push_draw(list: &mut DrawList, source: Source, first_vertex: u32, indices: Range<u32>) {
+    if indices.is_empty() {
+        return;
+    }
+    let batch = list.instances.len() as u32;
     list.instances.push(Instance { batch, ..Instance::default() });
-    list.draws.push(Draw {
-        source: Source::Streamed,
-        topology: Topology::Triangles,
-        indices: first..list.streamed.indices.len() as u32,
-        instances: batch..batch + 1,
-        first_vertex,
-    });
+    list.draws.push(Draw { source, topology: Topology::Triangles, indices, instances: batch..batch + 1, first_vertex });
 }

@@ -28,6 +28,7 @@ pub mod lattice;
 pub mod measure;
 pub mod mesh;
 pub mod open;
+pub mod patches;
 pub mod reach;
 pub mod roam;
 pub mod shells;
@@ -40,10 +41,11 @@ use self::covers::Covers;
 use self::front::Follower;
 use self::measure::Measured;
 use self::mesh::Mesh;
+use self::patches::Patches;
 use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
 use self::shells::Shells;
-use self::splits::{Found, Splits};
+use self::splits::{Changes, Found, Splits};
 use super::{Entry, Setting, Settings, Technique, Values, widened};
 use crate::draw::{DrawList, Draws, Geometry, Limits, Manner, Normals};
 use crate::height::Field;
@@ -83,6 +85,12 @@ pub const ENTRY: Entry = Entry {
             default: "off",
             about: "whether a wedge merges a little further away than it splits",
         },
+        Setting {
+            key: "patches",
+            values: Values::Words(&["streamed", "resident"]),
+            default: "streamed",
+            about: "whether all triangles are sent in each frame, or, of a land with samples, blocks that changed",
+        },
     ],
     most_samples: 1 << 27,
     takes_endless: true,
@@ -104,6 +112,8 @@ struct SphereTree {
     band: f64,
     hold: f64,
     limits: Limits,
+    /// What stays on the device, unless all is streamed.
+    patches: Option<Patches>,
     nothing: Geometry,
 }
 
@@ -123,6 +133,15 @@ impl Criterion {
             Criterion::Covers(follower) => follower.splits(),
             Criterion::Roam(follower) => follower.splits(),
             Criterion::Plain { splits, .. } => splits,
+        }
+    }
+
+    fn changes(&mut self) -> Changes {
+        match self {
+            Criterion::Spheres(follower) => follower.changes(),
+            Criterion::Covers(follower) => follower.changes(),
+            Criterion::Roam(follower) => follower.changes(),
+            Criterion::Plain { splits, .. } => splits.changes(),
         }
     }
 
@@ -148,8 +167,12 @@ impl SphereTree {
             _ => Criterion::Plain { splits: Splits::none(&measured), found: Found::default() },
         };
         let hold = if settings.word("hold") == "on" { HOLD } else { 1.0 };
-        let limits = limits(&measured, &blocks);
-        Self { measured, blocks, criterion, band: f64::from(band), hold, limits, nothing: Geometry::default() }
+        let mut limits = limits(&measured, &blocks);
+        let is_resident = settings.word("patches") == "resident" && !measured.is_endless();
+        let patches = is_resident.then(|| Patches::new(blocks.number(), &limits));
+        limits.upload_bytes = patches.as_ref().map_or(0, Patches::upload_bytes);
+        let (band, nothing) = (f64::from(band), Geometry::default());
+        Self { measured, blocks, criterion, band, hold, limits, patches, nothing }
     }
 }
 
@@ -170,7 +193,7 @@ fn most_splits(measured: &Measured) -> usize {
 
 impl Technique for SphereTree {
     fn resident(&self) -> &Geometry {
-        &self.nothing
+        self.patches.as_ref().map_or(&self.nothing, Patches::geometry)
     }
 
     fn limits(&self) -> Limits {
@@ -185,12 +208,20 @@ impl Technique for SphereTree {
         });
         list.widening = widening;
         self.blocks.look(view);
-        let Self { measured, blocks, criterion, .. } = self;
+        let changes = self.criterion.changes();
+        let Self { measured, blocks, criterion, patches, .. } = self;
+        if let Some(patches) = patches {
+            patches.begin(&changes, from.band > 1.0, blocks);
+        }
         let mesh = Mesh { measured, splits: criterion.splits(), blocks, from: &from };
         match measured.field.land() {
             Some(land) => mesh.fill_open(land, view, list),
-            None => mesh.fill(list),
+            None => mesh.fill(patches.as_mut(), list),
         }
+    }
+
+    fn is_settled(&self) -> bool {
+        !self.patches.as_ref().is_some_and(Patches::waits)
     }
 
     fn keeps_tolerance(&self) -> bool {

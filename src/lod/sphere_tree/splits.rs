@@ -10,6 +10,16 @@ use super::reach::Viewpoint;
 pub struct Splits {
     words: Words,
     count: usize,
+    changes: Changes,
+}
+
+/// What has split or merged since it was last asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Maybe all, and not only what follows.
+    pub all: bool,
+    /// Middles of diamonds.
+    pub middles: Vec<Place>,
 }
 
 /// One bit a diamond, by index.
@@ -73,7 +83,7 @@ pub struct Found {
 impl Splits {
     /// No split diamond.
     pub fn none(measured: &Measured) -> Self {
-        Self { words: Words::none(measured), count: 0 }
+        Self { words: Words::none(measured), count: 0, changes: Changes::default() }
     }
 
     fn clear(&mut self, measured: &Measured) {
@@ -86,6 +96,13 @@ impl Splits {
             words => *words = Words::none(measured),
         }
         self.count = 0;
+        self.changes.middles.clear();
+        self.changes.all = true;
+    }
+
+    /// What has split or merged since the last call.
+    pub fn changes(&mut self) -> Changes {
+        std::mem::take(&mut self.changes)
     }
 
     /// Whether a diamond has split, by index.
@@ -100,17 +117,25 @@ impl Splits {
     }
 
     /// Adds one that has not.
-    pub(super) fn insert(&mut self, index: usize) {
+    pub(super) fn insert(&mut self, at: Place, index: usize) {
         debug_assert!(!self.contains(index));
+        self.note(at);
         self.words.flip(index / 64, 1 << (index % 64));
         self.count += 1;
     }
 
     /// Removes one.
-    pub(super) fn remove(&mut self, index: usize) {
+    pub(super) fn remove(&mut self, at: Place, index: usize) {
         debug_assert!(self.contains(index));
+        self.note(at);
         self.words.flip(index / 64, 1 << (index % 64));
         self.count -= 1;
+    }
+
+    fn note(&mut self, at: Place) {
+        if !self.changes.all {
+            self.changes.middles.push(at);
+        }
     }
 
     /// Whether all parents of a diamond have split.
@@ -146,7 +171,7 @@ impl Splits {
                 if self.count == most {
                     return false;
                 }
-                self.insert(index);
+                self.insert(at, index);
                 found.split.push((at, index));
                 // The last of its parents to split opens a diamond.
                 let children = measured.lattice.children(at);
