@@ -150,7 +150,8 @@ impl<W: Watch> Follower<W> {
             return self.start(measured, from, most);
         }
         self.redeem();
-        self.settle(measured, from, most)
+        // On the way there may be more than at the end, since what merges comes last.
+        self.settle(measured, from, most) || self.start(measured, from, most)
     }
 
     fn start(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {

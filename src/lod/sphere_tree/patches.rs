@@ -241,6 +241,7 @@ mod tests {
         patches.begin(&Changes::default(), false, &blocks);
         assert!(keep(&mut patches, 9, &piece(40, 1.0), &blocks).0, "out of sight");
         assert!(keep(&mut patches, 0, &piece(40, 1.0), &blocks).0);
+        patches.begin(&Changes::default(), false, &blocks);
         assert!(keep(&mut patches, 1, &piece(40, 1.0), &blocks).0);
         assert_eq!(patches.of(9, &ROOTS), None);
         assert_eq!(keep(&mut patches, 2, &piece(40, 1.0), &blocks), (false, 0));
