@@ -9,6 +9,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
+use cuesta::height::progress::Progress;
 use cuesta::height::synth;
 use cuesta::lod::sphere_tree::covers::Covers;
 use cuesta::lod::sphere_tree::front::{Follower, Watch};
@@ -29,6 +30,9 @@ const FRAMES: usize = 200;
 /// Metres a frame: a walk, and a flight at 300 m/s and 60 frames a second.
 const SLOW_M: f64 = 0.05;
 const FAST_M: f64 = 5.0;
+
+/// Times that a path is walked: of each frame the shortest time counts, so that what else the machine does is no hitch.
+const ROUNDS: usize = 3;
 
 /// Medians and maxima of the counted frames.
 struct Row {
@@ -72,32 +76,43 @@ fn path(measured: &Measured, step_m: Option<f64>) -> Vec<DVec3> {
     (0..2 * FRAMES).map(|k| above(place(k))).collect()
 }
 
-fn row(path: &[DVec3], reach: Reach, mut follow: impl FnMut(&Viewpoint) -> usize) -> Row {
-    let measured = path.iter().map(|&eye| {
-        let from = Viewpoint { eye, reach, band: 1.0, hold: 1.0 };
-        let start = Instant::now();
-        let visited = follow(&from);
-        (2 * visited, 1e6 * start.elapsed().as_secs_f64())
-    });
-    let frames: Vec<_> = measured.collect();
-    let (mut visited, mut times): (Vec<_>, Vec<_>) = frames[FRAMES..].iter().copied().unzip();
+fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, mut begin: impl FnMut() -> F) -> Row {
+    let mut round = || -> Vec<_> {
+        let mut follow = begin();
+        let measured = path.iter().map(|&eye| {
+            let from = Viewpoint { eye, reach, band: 1.0, hold: 1.0 };
+            let start = Instant::now();
+            let visited = follow(&from);
+            (2 * visited, 1e6 * start.elapsed().as_secs_f64())
+        });
+        measured.collect()
+    };
+    let rounds: Vec<_> = (0..ROUNDS).map(|_| round()).collect();
+    let shortest = |k: usize| rounds.iter().map(|frames| frames[k].1).fold(f64::INFINITY, f64::min);
+    let (mut visited, mut times): (Vec<_>, Vec<_>) =
+        (FRAMES..path.len()).map(|k| (rounds[0][k].0, shortest(k))).unzip();
     visited.sort_unstable();
     times.sort_unstable_by(f64::total_cmp);
     Row { visited: [visited[FRAMES / 2], visited[FRAMES - 1]], time_us: [times[FRAMES / 2], times[FRAMES - 1]] }
 }
 
-fn following<W: Watch>(mut follower: Follower<W>, measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
-    row(path, reach, |from| {
-        follower.follow(measured, from, usize::MAX);
-        follower.visited()
+fn following<W: Watch>(begin: impl Fn() -> Follower<W>, measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
+    row(path, reach, || {
+        let mut follower = begin();
+        move |from| {
+            follower.follow(measured, from, usize::MAX);
+            follower.visited()
+        }
     })
 }
 
 fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
-    let (mut splits, mut found) = (Splits::none(measured), Found::default());
-    row(path, reach, |from| {
-        splits.refill(measured, from, &mut found, usize::MAX);
-        found.visited
+    row(path, reach, || {
+        let (mut splits, mut found) = (Splits::none(measured), Found::default());
+        move |from| {
+            splits.refill(measured, from, &mut found, usize::MAX);
+            found.visited
+        }
     })
 }
 
@@ -126,7 +141,7 @@ fn main() {
     logarithm_against_exponent();
     let mut field = synth::synth(synth::Kind::Fractal, [SIDE; 2], 7);
     field.spacing = [SPACING_M; 2];
-    let measured = Measured::new(Arc::new(field), 1.0);
+    let measured = Measured::new(Arc::new(field), 1.0, &Progress::default());
     for wedges in [10_000, 100_000, 1_000_000] {
         let start = path(&measured, Some(FAST_M))[FRAMES];
         let px = tolerance(&measured, start, wedges);
@@ -134,11 +149,14 @@ fn main() {
         for (name, step) in [("slow", Some(SLOW_M)), ("fast", Some(FAST_M)), ("leaping", None)] {
             let (path, reach) = (path(&measured, step), reach(px));
             println!("  {name}");
-            let mut bounded = Follower::<Queues>::new(&measured);
-            bounded.watch().largest_speed = FAST_M;
-            print("spheres", &following(Follower::<Shells>::new(&measured), &measured, &path, reach));
-            print("spheres with covers", &following(Follower::<Covers>::new(&measured), &measured, &path, reach));
-            print("ROAM, way gone", &following(Follower::<Queues>::new(&measured), &measured, &path, reach));
+            let bounded = || {
+                let mut bounded = Follower::<Queues>::new(&measured);
+                bounded.watch().largest_speed = FAST_M;
+                bounded
+            };
+            print("spheres", &following(|| Follower::<Shells>::new(&measured), &measured, &path, reach));
+            print("spheres with covers", &following(|| Follower::<Covers>::new(&measured), &measured, &path, reach));
+            print("ROAM, way gone", &following(|| Follower::<Queues>::new(&measured), &measured, &path, reach));
             print("ROAM, largest speed", &following(bounded, &measured, &path, reach));
             print("plain", &plain(&measured, &path, reach));
         }

@@ -3,7 +3,7 @@
 use super::layout::Frame;
 use super::place::{explicit_height, lattice_position, placed, turned_position};
 use super::skirts::is_skirted;
-use super::{Draw, DrawList, Geometry, Instance, Source, Topology};
+use super::{Draw, DrawList, Geometry, Instance, RESTART, Source, Topology};
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle, doubled_area};
 
@@ -102,7 +102,7 @@ pub fn assemble<T>(
                 }
             }
             Topology::Strip => {
-                for (k, t) in indices.windows(3).enumerate() {
+                for (k, t) in indices.windows(3).enumerate().filter(|(_, t)| !t.contains(&RESTART)) {
                     let (first, second) = if k % 2 == 0 { (t[0], t[1]) } else { (t[1], t[0]) };
                     visit(instance, [corner(first), corner(second), corner(t[2])]);
                 }

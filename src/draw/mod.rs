@@ -31,9 +31,13 @@ pub enum Source {
 pub enum Topology {
     /// Three indices a triangle, counter-clockwise seen from above.
     Triangles,
-    /// Each index makes a triangle with the two before it, the winding alternating.
+    /// Each index makes a triangle with the two before it, the winding alternating. [`RESTART`] ends a strip; the next
+    /// one begins after an even number of indices, so that its winding is that of its place in the draw.
     Strip,
 }
+
+/// The index that ends a strip.
+pub const RESTART: u32 = u32::MAX;
 
 /// Vertices and indices.
 #[derive(Clone, Debug, Default)]
@@ -205,7 +209,13 @@ impl Default for Draws {
 
 impl Draws {
     /// Triangles of explicit vertices, and no other draws.
-    pub const EXPLICIT: Self = Self { lattice: false, explicit: true, triangles: true, strips: false };
+    pub const EXPLICIT: Self = Self::explicit(Topology::Triangles);
+
+    /// Explicit vertices in one topology, and no other draws.
+    pub const fn explicit(topology: Topology) -> Self {
+        let strips = matches!(topology, Topology::Strip);
+        Self { lattice: false, explicit: true, triangles: !strips, strips }
+    }
 
     /// Whether such a draw is among them.
     pub fn hold(&self, source: Source, topology: Topology) -> bool {
@@ -216,7 +226,7 @@ impl Draws {
 }
 
 impl Topology {
-    /// Triangles that `indices` indices make, degenerate ones included.
+    /// Triangles that `indices` indices make at most, degenerate ones included: ends of strips are not known.
     pub fn triangles(self, indices: usize) -> usize {
         match self {
             Topology::Triangles => indices / 3,
@@ -285,7 +295,14 @@ impl DrawList {
 
     /// Triangles the list submits, degenerate ones included.
     pub fn triangles(&self) -> u64 {
-        self.draws.iter().map(|d| d.topology.triangles(d.indices.len()) as u64 * d.instances.len() as u64).sum()
+        let of_draw = |d: &Draw| match (d.source, d.topology) {
+            (Source::Streamed, Topology::Strip) => {
+                let indices = &self.streamed.indices[d.indices.start as usize..d.indices.end as usize];
+                indices.split(|&k| k == RESTART).map(|strip| d.topology.triangles(strip.len())).sum()
+            }
+            _ => d.topology.triangles(d.indices.len()),
+        };
+        self.draws.iter().map(|d| of_draw(d) as u64 * d.instances.len() as u64).sum()
     }
 
     /// Draw calls that the host records for the list: one for each run of draws of one source and topology, or

@@ -18,7 +18,7 @@ use super::memory::{Buffer, memory_barrier};
 use super::pipelines::{self, Pass};
 use super::terrain::Terrain;
 use crate::draw::layout::{Captured, CapturedPart};
-use crate::draw::{Draw, DrawList, Geometry, Source, Topology, expand};
+use crate::draw::{Draw, DrawList, Geometry, RESTART, Source, Topology, expand};
 use crate::plan::ScenePlan;
 
 /// Triangles in a part of a draw.
@@ -81,7 +81,11 @@ impl Capture {
         for draw in list.draws.iter().flat_map(|draw| draw.parts(PART)) {
             let geometry = expand::geometry(draw.source, resident, list);
             let indices = &geometry.indices[draw.indices.start as usize..draw.indices.end as usize];
-            let (first, last) = indices.iter().fold((u32::MAX, 0), |(low, high), &k| (low.min(k), high.max(k)));
+            let used_ones = indices.iter().filter(|&&k| k != RESTART);
+            let (first, last) = used_ones.fold((u32::MAX, 0), |(low, high), &k| (low.min(k), high.max(k)));
+            if first > last {
+                continue;
+            }
             let [first, last] = [first, last].map(|k| k + draw.first_vertex);
             let place = CapturedPart {
                 base: 0,

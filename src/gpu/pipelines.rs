@@ -205,7 +205,9 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
     };
     let mut stages = vec![stage(vk::ShaderStageFlags::VERTEX, vertex)];
     stages.extend(fragment.map(|module| stage(vk::ShaderStageFlags::FRAGMENT, module)));
-    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(d.topology);
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+        .topology(d.topology)
+        .primitive_restart_enable(d.topology == vk::PrimitiveTopology::TRIANGLE_STRIP);
     let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let polygon = if d.wireframe { vk::PolygonMode::LINE } else { vk::PolygonMode::FILL };
     let raster = vk::PipelineRasterizationStateCreateInfo::default()

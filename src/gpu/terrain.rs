@@ -17,7 +17,7 @@ use super::pipelines::Pipelines;
 use super::target::Formats;
 use super::texture_slots::{Overlay, TextureSlots};
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, RESTART, Source, Submission, Topology, Upload};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
@@ -419,8 +419,9 @@ impl Slot {
 
     /// Writes the frame's streamed indices, 16 bits each if all of them fit.
     fn write_indices(&mut self, indices: &[u32]) {
-        let highest = indices.iter().copied().fold(0, u32::max);
-        if highest <= u32::from(u16::MAX) {
+        let highest = indices.iter().copied().filter(|&k| k != RESTART).fold(0, u32::max);
+        // The highest number of either kind ends a strip.
+        if highest < u32::from(u16::MAX) {
             self.index_type = vk::IndexType::UINT16;
             self.indices.write_short(indices);
         } else {

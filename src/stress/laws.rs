@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::views;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
-use crate::draw::{Draw, DrawList, Geometry, Source};
+use crate::draw::{Draw, DrawList, Geometry, RESTART, Source, Topology};
 use crate::height::surface::{self, has_land, is_land};
 use crate::height::{Field, rtin};
 use crate::lod::Technique;
@@ -263,7 +263,9 @@ fn lists_fit(subject: &mut Subject) -> Result<(), Broken> {
 fn in_range(geometry: &Geometry, draw: &Draw) -> bool {
     let vertices = if draw.source == Source::Lattice { geometry.lattice.len() } else { geometry.vertices.len() };
     let indices = geometry.indices.get(draw.indices.start as usize..draw.indices.end as usize);
-    indices.is_some_and(|indices| indices.iter().all(|&k| ((k + draw.first_vertex) as usize) < vertices))
+    let is_end = |k: u32| k == RESTART && draw.topology == Topology::Strip;
+    let fits = |&k: &u32| is_end(k) || ((k + draw.first_vertex) as usize) < vertices;
+    indices.is_some_and(|indices| indices.iter().all(fits))
 }
 
 fn wider_never_more(subject: &mut Subject) -> Result<(), Broken> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cuesta::draw::layout::Frame;
 use cuesta::draw::{DrawList, ExplicitVertex, Geometry, Source, Upload, expand};
+use cuesta::height::progress::Progress;
 use cuesta::height::synth::{self, Kind};
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::sphere_tree::covers::Covers;
@@ -105,7 +106,7 @@ fn walk(field: &Field, steps: usize, seed: u64) -> Vec<(DVec3, f64)> {
 #[test]
 fn what_has_split_are_the_spheres_around_the_eye() {
     for field in [land([100, 140]), noise([40, 33])] {
-        let measured = Measured::new(Arc::clone(&field), 1.0);
+        let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
         let (all, mut found) = (diamonds(&measured), Found::default());
         let (mut splits, mut least, mut most) = (Splits::none(&measured), usize::MAX, 0);
         for (eye, px) in walk(&field, 60, 4) {
@@ -122,7 +123,7 @@ fn what_has_split_are_the_spheres_around_the_eye() {
 }
 
 fn follows<W: Watch>(field: &Arc<Field>, band: f64, hold: f64, seed: u64) {
-    let measured = Measured::new(Arc::clone(field), band as f32);
+    let measured = Measured::new(Arc::clone(field), band as f32, &Progress::default());
     let (mut follower, mut found) = (Follower::<W>::new(&measured), Found::default());
     let (mut splits, mut saved) = (Splits::none(&measured), 0);
     for (step, (eye, px)) in walk(field, 1500, seed).into_iter().enumerate() {
@@ -162,7 +163,7 @@ fn two_queues_find_the_same_as_all() {
 #[test]
 fn a_follower_gives_up_beyond_its_limit_and_recovers() {
     let field = land([100, 140]);
-    let measured = Measured::new(Arc::clone(&field), 1.0);
+    let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
     let (mut follower, mut found) = (Follower::<Shells>::new(&measured), Found::default());
     let mut splits = Splits::none(&measured);
     let views: Vec<_> = walk(&field, 400, 8).iter().map(|&(eye, px)| viewpoint(&measured, eye, px)).collect();

@@ -23,6 +23,7 @@ use super::pages::{Gaze, Grid, Pages, Row};
 use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
+use super::topology;
 use super::walk::{Ground, Stream, Worker};
 use super::{ENTRY, MOST_PAGES, MOST_TRIANGLES, join_streams};
 use crate::draw::{Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Source, Topology};
@@ -44,6 +45,9 @@ pub struct CaveStrips {
     /// One a row of pages.
     rows: Vec<RowWorker>,
     sequence: Sequence,
+    topology: Topology,
+    /// Indices of a frame as they are walked: three a triangle.
+    most_indices: usize,
     limits: Limits,
     /// Parts of the picture beside it in which squares are as fine as in it.
     guard: f64,
@@ -77,16 +81,18 @@ struct RowWorker {
 }
 
 impl CaveStrips {
-    /// Measures both fields. Of the room's settings it takes `page`, `order` and `guard`; levels are certified.
+    /// Measures both fields. Of the room's settings it takes `page`, `order`, `topology` and `guard`; levels are certified.
     pub fn new(cave: Arc<Cave>, settings: &Settings) -> Self {
         let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MOST_PAGES);
         let (pages, cells) = (grid.count[0] as usize * grid.count[1] as usize, grid.side() as usize);
         let rows = grid.count[0].max(grid.count[1]) as usize;
+        let topology = topology::of(settings.word("topology"));
+        let most_indices = 3 * (4 * pages * cells * cells).min(MOST_TRIANGLES);
         let limits = Limits {
             draws: rows,
             instances: rows,
             vertices: (2 * pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
-            indices: 3 * (4 * pages * cells * cells).min(MOST_TRIANGLES),
+            indices: topology::most_indices(topology, most_indices),
             ..Limits::default()
         };
         Self {
@@ -98,6 +104,8 @@ impl CaveStrips {
             splits: Splits::new(grid),
             rows: Vec::new(),
             sequence: Sequence::of(settings.word("order")),
+            topology,
+            most_indices,
             limits,
             guard: settings.number("guard"),
             nothing: Geometry::default(),
@@ -123,7 +131,7 @@ impl CaveStrips {
     fn split(&mut self, view: &View) -> bool {
         self.splits.clear();
         // A split square has at least six triangles more, floor and ceiling twice as many.
-        let most = self.limits.indices / 18 + 1;
+        let most = self.most_indices / 18 + 1;
         let seen = guarded(view, self.guard);
         [self.cave.floor(), self.cave.ceiling()].into_iter().zip(&self.errors).all(|(field, errors)| {
             Certified::new(field, errors, &self.pages, [view, &seen], most).split(&mut self.splits)
@@ -142,7 +150,7 @@ impl CaveStrips {
         });
         let made = || self.rows[..rows.len()].iter().map(|row| &row.pairs.stream);
         made().map(|s| s.vertices.len()).sum::<usize>() <= self.limits.vertices
-            && made().map(|s| s.indices.len()).sum::<usize>() <= self.limits.indices
+            && made().map(|s| s.indices.len()).sum::<usize>() <= self.most_indices
     }
 
     fn fill(&self, rows: usize, list: &mut DrawList) {
@@ -158,6 +166,7 @@ impl CaveStrips {
             first_vertex += stream.vertices.len() as u32;
         }
         self.sequence.arrange(list);
+        topology::arrange(self.topology, list);
     }
 }
 
@@ -181,7 +190,7 @@ impl Technique for CaveStrips {
     }
 
     fn manner(&self) -> Manner {
-        Manner { draws: Draws::EXPLICIT, ..Manner::default() }
+        Manner { draws: Draws::explicit(self.topology), ..Manner::default() }
     }
 
     fn keeps_tolerance(&self) -> bool {

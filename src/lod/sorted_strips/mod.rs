@@ -43,6 +43,7 @@ pub mod sequence;
 pub mod shapes;
 pub mod splits;
 pub mod table;
+pub mod topology;
 pub mod walk;
 
 use std::sync::Arc;
@@ -102,6 +103,12 @@ pub const ENTRY: Entry = Entry {
             about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer; or in no order",
         },
         Setting {
+            key: "topology",
+            values: Values::Words(topology::WORDS),
+            default: "list",
+            about: "three indices a triangle, or strips that end where the order of sight leaves them",
+        },
+        Setting {
             key: "guard",
             values: Values::Number(0.0, 1000.0),
             default: "0.25",
@@ -142,9 +149,12 @@ struct SortedStrips {
     guard: f64,
     blends: bool,
     sequence: Sequence,
+    topology: Topology,
     is_serial: bool,
     /// Of the last frame.
     triangles_before: usize,
+    /// Indices of a frame as they are walked: three a triangle.
+    most_indices: usize,
     limits: Limits,
     nothing: Geometry,
 }
@@ -154,11 +164,13 @@ impl SortedStrips {
         let grid = Grid::new(&field, (settings.number("page") as u32).ilog2(), MOST_PAGES);
         let cells = grid.side() as usize;
         let pages = (grid.count[0] * grid.count[1]) as usize;
+        let topology = topology::of(settings.word("topology"));
+        let most_indices = 3 * (2 * pages * cells * cells).min(MOST_TRIANGLES);
         let limits = Limits {
             draws: grid.count[0].max(grid.count[1]) as usize,
             instances: grid.count[0].max(grid.count[1]) as usize,
             vertices: (pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
-            indices: 3 * (2 * pages * cells * cells).min(MOST_TRIANGLES),
+            indices: topology::most_indices(topology, most_indices),
             ..Limits::default()
         };
         Self {
@@ -172,8 +184,10 @@ impl SortedStrips {
             guard: settings.number("guard"),
             blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
             sequence: Sequence::of(settings.word("order")),
+            topology,
             is_serial: settings.variant() == Some("serial"),
             triangles_before: 0,
+            most_indices,
             limits,
             nothing: Geometry::default(),
         }
@@ -201,7 +215,7 @@ impl SortedStrips {
         let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
         let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: self.blends };
         let has_room =
-            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.limits.indices;
+            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.most_indices;
         if let [worker] = workers {
             let walk = |row: &Row| {
                 let before = worker.stream.lengths();
@@ -237,7 +251,7 @@ impl SortedStrips {
         self.splits.clear();
         let seen = guarded(view, self.guard);
         // A split square has at least six triangles more.
-        let most = self.limits.indices / 18 + 1;
+        let most = self.most_indices / 18 + 1;
         let certified = Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most);
         if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
     }
@@ -261,6 +275,7 @@ impl SortedStrips {
             first_vertex += vertices;
         }
         self.sequence.arrange(list);
+        topology::arrange(self.topology, list);
     }
 }
 
@@ -290,7 +305,7 @@ impl Technique for SortedStrips {
         let (lengths, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, of_frame));
         self.fill(&lengths, of_frame, list);
         self.workers = workers;
-        self.triangles_before = list.streamed.indices.len() / 3;
+        self.triangles_before = lengths.iter().map(|[_, indices]| indices / 3).sum();
         list.widening = widening;
     }
 
@@ -299,7 +314,8 @@ impl Technique for SortedStrips {
     }
 
     fn manner(&self) -> Manner {
-        Manner { draws: Draws::EXPLICIT, hiding: self.sequence.hiding(), ..Manner::default() }
+        let draws = Draws::explicit(self.topology);
+        Manner { draws, hiding: self.sequence.hiding(), ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -16,6 +16,7 @@ use super::lattice::{Diamond, Lattice, Place};
 use super::reach::Reach;
 use crate::height::Field;
 use crate::height::bounds::ROUNDING;
+use crate::height::progress::Progress;
 use crate::height::surface::{self, Corner};
 
 /// What rounding may take from a ball, relative: far more than that of a distance in f64.
@@ -58,7 +59,7 @@ impl Measured {
     /// Measures all diamonds, level by level in parallel. Where vertices fade in over a `band` above 1 times a sphere's
     /// radius and one does not, because its diamond sticks out of the field, its parents' spheres are larger by that:
     /// what they hang on is there in full.
-    pub fn new(field: Arc<Field>, band: f32) -> Self {
+    pub fn new(field: Arc<Field>, band: f32, progress: &Progress) -> Self {
         let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
         if let Some(land) = field.land() {
             let evaluated = Some(Evaluated::new(Arc::clone(land), band > 1.0));
@@ -70,19 +71,24 @@ impl Measured {
         let nothing = || vec![0.0; lattice.size()];
         let mut measured =
             Self { errors: nothing(), balls: nothing(), field, lattice, band, rounding, evaluated: None };
+        // Every level goes through all samples.
+        let rows = |level: u32| (measured.lattice.count(level)[1] as u64) << level;
+        progress.expect((0..measured.lattice.levels()).map(|level| 2 * rows(level)).sum());
         for level in 0..measured.lattice.levels() {
             // Sides before cells: a cell's children are in its sides.
-            measured.measure_level(level, |i, j| (i ^ j) & 1 == 1);
-            measured.measure_level(level, |i, j| i & j & 1 == 1);
+            measured.measure_level(level, progress, |i, j| (i ^ j) & 1 == 1);
+            measured.measure_level(level, progress, |i, j| i & j & 1 == 1);
         }
         measured
     }
 
-    fn measure_level(&mut self, level: u32, is_meant: impl Fn(i32, i32) -> bool + Sync) {
+    fn measure_level(&mut self, level: u32, progress: &Progress, is_meant: impl Fn(i32, i32) -> bool + Sync) {
         let [x_count, z_count] = self.lattice.count(level);
         let of_row = |j: i32| {
             let row = (0..x_count).filter(|&i| is_meant(i, j));
-            row.map(|i| self.measure([i << level, j << level])).collect::<Vec<_>>()
+            let row = row.map(|i| self.measure([i << level, j << level])).collect::<Vec<_>>();
+            progress.advance(1 << level);
+            row
         };
         let rows: Vec<_> = (0..z_count).into_par_iter().map(of_row).collect();
         for (index, error, ball) in rows.into_iter().flatten() {
@@ -212,7 +218,7 @@ mod tests {
     #[test]
     fn errors_and_balls_are_nested_whatever_the_size() {
         for (size, band) in [([33, 33], 1.0), ([33, 33], 1.3), ([37, 21], 1.0), ([37, 21], 1.3), ([2, 30], 1.3)] {
-            let measured = Measured::new(field(size), band);
+            let measured = Measured::new(field(size), band, &Progress::default());
             let mut children = 0;
             each(&measured, |parent| {
                 let out = |at| measured.lattice.sticks_out(at);
@@ -232,7 +238,9 @@ mod tests {
 
     #[test]
     fn a_ball_holds_every_sample_that_its_wedges_cover() {
-        let measured = Measured::new(field([37, 21]), 1.0);
+        let progress = Progress::default();
+        let measured = Measured::new(field([37, 21]), 1.0, &progress);
+        assert_eq!(progress.share(), Some(1.0));
         let mut samples = 0;
         each(&measured, |known| {
             let Diamond { ends, apexes } = Diamond::around(known.at);

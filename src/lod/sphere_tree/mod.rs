@@ -115,6 +115,8 @@ struct SphereTree {
     /// What stays on the device, unless all is streamed.
     patches: Option<Patches>,
     nothing: Geometry,
+    /// Bytes of vertices and indices in the last list.
+    sent: usize,
 }
 
 impl Criterion {
@@ -158,7 +160,7 @@ impl Criterion {
 impl SphereTree {
     fn new(field: Arc<Field>, settings: &Settings) -> Self {
         let band = if settings.word("morph") == "on" { BAND } else { 1.0 };
-        let measured = Measured::new(field, band);
+        let measured = Measured::new(field, band, &settings.progress);
         let blocks = Blocks::new(&measured.field, &measured.lattice);
         let criterion = match settings.word("criterion") {
             "spheres" => Criterion::Spheres(Follower::new(&measured)),
@@ -172,7 +174,7 @@ impl SphereTree {
         let patches = is_resident.then(|| Patches::new(blocks.number(), &limits));
         limits.upload_bytes = patches.as_ref().map_or(0, Patches::upload_bytes);
         let (band, nothing) = (f64::from(band), Geometry::default());
-        Self { measured, blocks, criterion, band, hold, limits, patches, nothing }
+        Self { measured, blocks, criterion, band, hold, limits, patches, nothing, sent: 0 }
     }
 }
 
@@ -218,6 +220,8 @@ impl Technique for SphereTree {
             Some(land) => mesh.fill_open(land, view, list),
             None => mesh.fill(patches.as_mut(), list),
         }
+        let size = list.size();
+        self.sent = size.upload_bytes + patches::bytes(size.vertices, size.indices);
     }
 
     fn is_settled(&self) -> bool {
@@ -237,6 +241,7 @@ impl Technique for SphereTree {
         vec![
             ("wedges visited for the last view", 2.0 * self.criterion.visited() as f64, ""),
             ("wedges split in the last view", 2.0 * self.criterion.splits().count() as f64, ""),
+            ("bytes of triangles sent for the last view", self.sent as f64, "B"),
             ("bytes of errors and balls", self.measured.bytes() as f64, "B"),
         ]
     }

@@ -164,7 +164,8 @@ fn usizes(range: &Range<u32>) -> Range<usize> {
     range.start as usize..range.end as usize
 }
 
-fn bytes(vertices: usize, indices: usize) -> usize {
+/// Bytes of so many vertices and indices.
+pub fn bytes(vertices: usize, indices: usize) -> usize {
     vertices * size_of::<ExplicitVertex>() + indices * size_of::<u32>()
 }
 
