@@ -3,14 +3,16 @@
 //!
 //! ROAM stands here twice: its priorities wait for the way that the viewpoint has really gone, which is the best that
 //! they can, and for that at the largest speed it may have, as published: here the fast path's.
+//! And what is selected and sent for a frame where triangles are streamed, and where blocks are kept on the device.
 //! `cargo bench --no-default-features --bench spheres`, while nothing else runs.
 
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
+use cuesta::draw::{DrawList, ExplicitVertex};
 use cuesta::height::progress::Progress;
-use cuesta::height::synth;
+use cuesta::height::{Field, synth};
 use cuesta::lod::sphere_tree::covers::Covers;
 use cuesta::lod::sphere_tree::front::{Follower, Watch};
 use cuesta::lod::sphere_tree::measure::Measured;
@@ -18,6 +20,7 @@ use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::lod::sphere_tree::roam::Queues;
 use cuesta::lod::sphere_tree::shells::Shells;
 use cuesta::lod::sphere_tree::splits::{Found, Splits};
+use cuesta::lod::{self, Settings};
 use cuesta::texture::resolution::{level_by_exponent, level_by_logarithm};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
@@ -40,16 +43,20 @@ struct Row {
     time_us: [f64; 2],
 }
 
-fn reach(px: f64) -> Reach {
-    Reach::new(&View {
-        eye: DVec3::ZERO,
-        world_from_eye: View::turned(0.0, 0.0, 0.0),
+fn view(eye: DVec3, px: f64) -> View {
+    View {
+        eye,
+        world_from_eye: View::turned(37.0, -15.0, 0.0),
         lens: Lens::Perspective { fov_x: 1.2 },
         size: [1280, 720],
         near: 0.1,
         tolerance: Tolerance { px, metric: Metric::Certified },
         time_s: 0.0,
-    })
+    }
+}
+
+fn reach(px: f64) -> Reach {
+    Reach::new(&view(DVec3::ZERO, px))
 }
 
 /// The tolerance, pixels, at which an eye sees so many wedges.
@@ -76,7 +83,7 @@ fn path(measured: &Measured, step_m: Option<f64>) -> Vec<DVec3> {
     (0..2 * FRAMES).map(|k| above(place(k))).collect()
 }
 
-fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, mut begin: impl FnMut() -> F) -> Row {
+fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, count: usize, mut begin: impl FnMut() -> F) -> Row {
     let mut round = || -> Vec<_> {
         let mut follow = begin();
         let measured = path.iter().map(|&eye| {
@@ -87,7 +94,7 @@ fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, mut begin: i
         });
         measured.collect()
     };
-    let rounds: Vec<_> = (0..ROUNDS).map(|_| round()).collect();
+    let rounds: Vec<_> = (0..count).map(|_| round()).collect();
     let shortest = |k: usize| rounds.iter().map(|frames| frames[k].1).fold(f64::INFINITY, f64::min);
     let (mut visited, mut times): (Vec<_>, Vec<_>) =
         (FRAMES..path.len()).map(|k| (rounds[0][k].0, shortest(k))).unzip();
@@ -97,7 +104,7 @@ fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, mut begin: i
 }
 
 fn following<W: Watch>(begin: impl Fn() -> Follower<W>, measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
-    row(path, reach, || {
+    row(path, reach, ROUNDS, || {
         let mut follower = begin();
         move |from| {
             follower.follow(measured, from, usize::MAX);
@@ -107,7 +114,8 @@ fn following<W: Watch>(begin: impl Fn() -> Follower<W>, measured: &Measured, pat
 }
 
 fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
-    row(path, reach, || {
+    // It does the same in every frame.
+    row(path, reach, 1, || {
         let (mut splits, mut found) = (Splits::none(measured), Found::default());
         move |from| {
             splits.refill(measured, from, &mut found, usize::MAX);
@@ -119,6 +127,38 @@ fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
 fn print(name: &str, Row { visited, time_us }: &Row) {
     let ([visits, most], [us, longest]) = (visited, time_us);
     println!("    {name:22} {visits:8} wedges (most {most:8}) {us:9.1} µs (longest {longest:9.1})");
+}
+
+/// Selects along a path with a technique's own lists: medians and maxima of bytes sent and of time, after the frames that
+/// do not count.
+fn patches(field: &Arc<Field>, patches: &str, path: &[DVec3], px: f64) {
+    let entry = lod::find("sphere-tree").expect("in the table");
+    let settings = [("patches".to_string(), patches.to_string())];
+    let mut technique = (entry.build)(Arc::clone(field), &Settings::new(entry, None, &settings).expect("a setting"));
+    let (mut list, mut bytes, mut times) = (DrawList::default(), Vec::new(), Vec::new());
+    for (k, &eye) in path.iter().enumerate() {
+        list.clear();
+        let start = Instant::now();
+        technique.select(&view(eye, px), &mut list);
+        let time_ms = 1e3 * start.elapsed().as_secs_f64();
+        if k >= FRAMES {
+            let size = list.size();
+            let streamed = size.vertices * size_of::<ExplicitVertex>() + size.indices * size_of::<u32>();
+            bytes.push(streamed + size.upload_bytes);
+            times.push(time_ms);
+        }
+    }
+    bytes.sort_unstable();
+    times.sort_unstable_by(f64::total_cmp);
+    let [median, last] = [FRAMES / 2, FRAMES - 1];
+    println!(
+        "    {patches:9} {:9} triangles in the last frame, {:9} B sent (most {:9}), {:7.2} ms (longest {:7.2})",
+        list.triangles(),
+        bytes[median],
+        bytes[last],
+        times[median],
+        times[last]
+    );
 }
 
 fn logarithm_against_exponent() {
@@ -159,6 +199,8 @@ fn main() {
             print("ROAM, way gone", &following(|| Follower::<Queues>::new(&measured), &measured, &path, reach));
             print("ROAM, largest speed", &following(bounded, &measured, &path, reach));
             print("plain", &plain(&measured, &path, reach));
+            patches(&measured.field, "streamed", &path, px);
+            patches(&measured.field, "resident", &path, px);
         }
     }
 }

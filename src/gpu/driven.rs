@@ -13,7 +13,7 @@ use super::frames::{Recording, SLOTS, once};
 use super::memory::{Buffer, filled, memory_barrier};
 use super::pipelines;
 use super::shaders::Constants;
-use super::terrain::COMMAND;
+use super::slot::COMMAND;
 use crate::draw::driver::{Groups, Step};
 use crate::draw::layout::{Instance, Tally};
 use crate::draw::{Draw, DrawList, Driver, Source, Submission, Topology};

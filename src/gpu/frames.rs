@@ -43,7 +43,10 @@ pub struct Frames {
 
 struct Slot {
     pool: vk::CommandPool,
-    commands: vk::CommandBuffer,
+    /// One for each submission of a frame.
+    commands: Vec<vk::CommandBuffer>,
+    /// Which of them is being recorded.
+    current: usize,
     fence: vk::Fence,
     stamps: vk::QueryPool,
     statistics: vk::QueryPool,
@@ -80,6 +83,7 @@ impl Frames {
         self.wait(slot)?;
         let state = &mut self.slots[slot];
         state.scopes.clear();
+        state.current = 0;
         state.has_statistics = false;
         state.counts_passed = self.counts_passed && state.passed != vk::QueryPool::null();
         // SAFETY: the slot's fence says its commands have ended.
@@ -94,10 +98,28 @@ impl Frames {
                     self.gpu.raw.reset_query_pool(state.passed, 0, 1);
                 }
             }
-            let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            self.gpu.raw.begin_command_buffer(state.commands, &info)?;
         }
-        Ok(Recording { gpu: &self.gpu, commands: state.commands, slot, state, measured: self.measured })
+        begin(&self.gpu, state.commands[0])?;
+        Ok(self.resume())
+    }
+
+    /// Goes on recording the frame that was begun.
+    pub fn resume(&mut self) -> Recording<'_> {
+        let state = &mut self.slots[self.next];
+        let commands = state.commands[state.current];
+        Recording { gpu: &self.gpu, commands, slot: self.next, state, measured: self.measured }
+    }
+
+    /// Submits what is recorded of a frame so far; the rest is recorded into another command buffer.
+    pub fn submit_part(&mut self) -> Result<()> {
+        let gpu = &self.gpu;
+        let slot = &mut self.slots[self.next];
+        submit(gpu, slot.commands[slot.current], vk::SubmitInfo2::default(), vk::Fence::null())?;
+        slot.current += 1;
+        if slot.current == slot.commands.len() {
+            slot.commands.push(command_buffer(gpu, slot.pool)?);
+        }
+        begin(gpu, slot.commands[slot.current])
     }
 
     /// Ends recording and submits, waiting for and signalling the given semaphores.
@@ -106,18 +128,11 @@ impl Frames {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let semaphore = |s: vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage);
         let (wait, signal) = (wait.map(semaphore), signal.map(semaphore));
-        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(slot.commands)];
-        let submit = [vk::SubmitInfo2::default()
-            .command_buffer_infos(&commands)
-            .wait_semaphore_infos(wait.as_slice())
-            .signal_semaphore_infos(signal.as_slice())];
-        // SAFETY: the command buffer was begun in this slot and nothing else uses the queue.
-        unsafe {
-            self.gpu.raw.end_command_buffer(slot.commands)?;
-            self.gpu.raw.reset_fences(&[slot.fence])?;
-            let submitted = self.gpu.told(|| self.gpu.raw.queue_submit2(self.gpu.queue, &submit, slot.fence));
-            submitted.context("submitting a frame")?;
-        }
+        let info =
+            vk::SubmitInfo2::default().wait_semaphore_infos(wait.as_slice()).signal_semaphore_infos(signal.as_slice());
+        // SAFETY: the frame before in this slot has ended.
+        unsafe { self.gpu.raw.reset_fences(&[slot.fence])? };
+        submit(&self.gpu, slot.commands[slot.current], info, slot.fence)?;
         self.next = (self.next + 1) % SLOTS;
         Ok(())
     }
@@ -144,17 +159,13 @@ impl Frames {
 }
 
 impl Recording<'_> {
-    /// Records a pass under one name: debug label, timestamps, and, for `terrain`, pipeline statistics.
+    /// Records a pass under one name: debug label and timestamps.
     pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
-        self.timed_scope(name, name == "terrain", record)
+        self.counted_scope(name, false, record)
     }
 
-    /// As [`Self::scope`] without statistics: what is recorded may take its own.
-    pub fn uncounted_scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
-        self.timed_scope(name, false, record)
-    }
-
-    fn timed_scope<T>(
+    /// The same, with pipeline statistics if it `counts`: one pass of a frame at most.
+    pub fn counted_scope<T>(
         &mut self,
         name: &'static str,
         counts: bool,
@@ -214,9 +225,7 @@ impl Slot {
         unsafe {
             let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);
             let pool = gpu.raw.create_command_pool(&info, None)?;
-            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let commands = gpu.raw.allocate_command_buffers(&info)?[0];
-            gpu.name(commands, "frame");
+            let commands = vec![command_buffer(gpu, pool)?];
             let info = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
             let fence = gpu.raw.create_fence(&info, None)?;
             let stamps = if measured {
@@ -235,7 +244,18 @@ impl Slot {
                 vk::QueryPool::null()
             };
             let (scopes, has_statistics, counts_passed) = (Vec::new(), false, false);
-            Ok(Self { pool, commands, fence, stamps, statistics, passed, counts_passed, scopes, has_statistics })
+            Ok(Self {
+                pool,
+                commands,
+                current: 0,
+                fence,
+                stamps,
+                statistics,
+                passed,
+                counts_passed,
+                scopes,
+                has_statistics,
+            })
         }
     }
 
@@ -275,6 +295,30 @@ impl Drop for Frames {
                 self.gpu.raw.destroy_command_pool(slot.pool, None);
             }
         }
+    }
+}
+
+fn command_buffer(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
+    let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+    // SAFETY: the pool is alive, and only its own thread uses it.
+    let commands = unsafe { gpu.raw.allocate_command_buffers(&info)? }[0];
+    gpu.name(commands, "frame");
+    Ok(commands)
+}
+
+fn begin(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+    let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    // SAFETY: the slot's fence says that its commands have ended, and its pool was reset.
+    Ok(unsafe { gpu.raw.begin_command_buffer(commands, &info)? })
+}
+
+fn submit(gpu: &Gpu, commands: vk::CommandBuffer, info: vk::SubmitInfo2, fence: vk::Fence) -> Result<()> {
+    let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+    let info = [info.command_buffer_infos(&buffers)];
+    // SAFETY: the command buffer was begun in its slot and nothing else uses the queue.
+    unsafe {
+        gpu.raw.end_command_buffer(commands)?;
+        gpu.told(|| gpu.raw.queue_submit2(gpu.queue, &info, fence)).context("submitting a frame")
     }
 }
 

@@ -26,6 +26,7 @@ pub mod renderdoc;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;
+pub mod slot;
 #[cfg(feature = "viewer")]
 pub mod swapchain;
 pub mod target;

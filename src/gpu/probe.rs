@@ -194,10 +194,10 @@ impl Terrain {
             bail!("profile: {} pieces, at most {} can be measured", pieces.len(), DRAWS + PIPELINES);
         }
         self.with_sky(recording, |recording| {
-            recording.uncounted_scope("terrain", |r| {
+            recording.scope("terrain", |r| {
                 probe.begin(r, pieces.len());
                 let mut next = 0;
-                self.each_run(r, list, |r, run| {
+                self.each_run(r, list, 0, |r, run| {
                     let first = &list.draws[run.start];
                     r.gpu.begin_label(r.commands, pipeline_name(first.source, first.topology));
                     while let Some(piece) = pieces.get(next).filter(|piece| run.contains(&piece.draws.start)) {

@@ -54,8 +54,6 @@ pub fn depth_image(gpu: &Arc<Gpu>, size: [u32; 2], uses: vk::ImageUsageFlags) ->
 /// Begins drawing into an attachment, cleared to alpha 0 (no land) and the far plane.
 pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
     use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-    let gpu = recording.gpu;
-    let commands = recording.commands;
     let colour_write =
         (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
     let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
@@ -64,7 +62,7 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
     let colour_used = (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED);
     let before = image_barrier(colour.image, colour.format, colour_used, colour_write);
     match depth {
-        None => barriers(gpu, commands, &[before]),
+        None => barriers(recording.gpu, recording.commands, &[before]),
         Some((image, _)) => {
             // And the depth's: tested, copied out, or read by a pass of its own.
             let used = tests | Stage::COPY | Stage::FRAGMENT_SHADER;
@@ -72,22 +70,39 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
                 (used, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
                 (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
             );
-            barriers(gpu, commands, &[before, depth_before]);
+            barriers(recording.gpu, recording.commands, &[before, depth_before]);
         }
     }
+    open(recording, colour, depth, vk::AttachmentLoadOp::CLEAR);
+}
+
+/// Goes on drawing into an attachment over what an earlier submission of the same frame drew.
+pub fn go_on(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
+    use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+    let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
+    let stages = Stage::COLOR_ATTACHMENT_OUTPUT | tests;
+    let written = Access::COLOR_ATTACHMENT_WRITE | Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
+    let read = Access::COLOR_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_READ;
+    memory_barrier(recording.gpu, recording.commands, (stages, written), (stages, written | read));
+    open(recording, colour, depth, vk::AttachmentLoadOp::LOAD);
+}
+
+fn open(recording: &Recording, colour: Attachment, depth: Option<Depth>, load: vk::AttachmentLoadOp) {
+    use vk::ImageLayout as Layout;
+    let (gpu, commands) = (recording.gpu, recording.commands);
     let clear = vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } };
     let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
     let colours = [vk::RenderingAttachmentInfo::default()
         .image_view(colour.view)
         .image_layout(Layout::COLOR_ATTACHMENT_OPTIMAL)
-        .load_op(vk::AttachmentLoadOp::CLEAR)
+        .load_op(load)
         .store_op(vk::AttachmentStoreOp::STORE)
         .clear_value(clear)];
     let depth = depth.map(|(image, store)| {
         vk::RenderingAttachmentInfo::default()
             .image_view(image.view)
             .image_layout(Layout::DEPTH_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .load_op(load)
             .store_op(store)
             .clear_value(far)
     });

@@ -14,6 +14,7 @@ use super::materials;
 use super::memory::{Buffer, Image, filled, memory_barrier};
 use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
+use super::slot::{COMMAND, Part, Slot};
 use super::target::Formats;
 use super::texture_slots::{Overlay, TextureSlots};
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
@@ -44,25 +45,8 @@ struct Resident {
     indices: Buffer,
 }
 
-/// What one frame in flight writes.
-struct Slot {
-    set: vk::DescriptorSet,
-    frame: Buffer,
-    instances: Buffer,
-    commands: Buffer,
-    vertices: Buffer,
-    normals: Buffer,
-    indices: Buffer,
-    /// Width of the streamed indices: 16 bits where all of the frame's fit.
-    index_type: vk::IndexType,
-    staging: Buffer,
-}
-
 /// Sampled images of a scene.
 pub(super) const IMAGES: usize = 5;
-
-/// Bytes of an indexed indirect command.
-pub(super) const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
 
 impl Terrain {
     /// Makes the resources of a scene for a technique that keeps these on the device.
@@ -182,16 +166,22 @@ impl Terrain {
     /// # Panics
     /// If the list exceeds the limits that its technique stated.
     pub fn prepare(&mut self, recording: &mut Recording, frame: &Frame, list: &DrawList) -> Result<()> {
+        self.prepare_part(recording, frame, list, &Part::whole())
+    }
+
+    /// The same for a part of a list.
+    ///
+    /// # Panics
+    /// If the list exceeds the limits that its technique stated.
+    pub fn prepare_part(
+        &mut self,
+        recording: &mut Recording,
+        frame: &Frame,
+        list: &DrawList,
+        part: &Part,
+    ) -> Result<()> {
         assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
-        let slot = &mut self.slots[recording.slot];
-        slot.frame.write(0, bytemuck::bytes_of(frame));
-        slot.instances.write(0, cast_slice(&list.instances));
-        slot.vertices.write(0, cast_slice(&list.streamed.vertices));
-        slot.normals.write(0, cast_slice(&list.streamed.normals));
-        slot.write_indices(&list.streamed.indices);
-        for (k, draw) in list.draws.iter().enumerate() {
-            slot.commands.write(k * COMMAND, &command_bytes(draw));
-        }
+        self.slots[recording.slot].write(frame, list, part);
         if list.uploads.is_empty() {
             return Ok(());
         }
@@ -242,12 +232,21 @@ impl Terrain {
 
     /// Records the land and the sky: between the target's begin and end.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        self.with_sky(recording, |recording| {
-            recording.scope("terrain", |r| {
-                self.each_run(r, list, |r, run| self.submit(r, list, run));
+        self.draw_part(recording, list, &Part::whole())
+    }
+
+    /// Records a part of the land, and the sky with the last part, or with the first one where there is no depth: between
+    /// the target's begin and end. What is run is counted for whole lists only.
+    pub fn draw_part(&self, recording: &mut Recording, list: &DrawList, part: &Part) -> Result<()> {
+        let record = |recording: &mut Recording| {
+            let is_whole = part.is_first() && part.is_last;
+            recording.counted_scope("terrain", is_whole, |r| {
+                self.each_run(r, list, part.before.draws, |r, run| self.submit(r, list, run));
                 Ok(())
             })
-        })
+        };
+        let has_sky = if self.pipelines.has_depth { part.is_last } else { part.is_first() };
+        if has_sky { self.with_sky(recording, record) } else { record(recording) }
     }
 
     /// Records land, and the sky after it, where depth is 0 still; without depth before it.
@@ -264,8 +263,14 @@ impl Terrain {
         record(recording)
     }
 
-    /// Calls `record` for each run of draws of one pipeline, with that and its geometry bound.
-    pub(super) fn each_run(&self, r: &Recording, list: &DrawList, mut record: impl FnMut(&Recording, Range<usize>)) {
+    /// Calls `record` for each run of draws of one pipeline from one draw on, with that and its geometry bound.
+    pub(super) fn each_run(
+        &self,
+        r: &Recording,
+        list: &DrawList,
+        mut first: usize,
+        mut record: impl FnMut(&Recording, Range<usize>),
+    ) {
         self.bind_scene(r);
         if list.submission == Submission::Driven {
             self.bind_pipeline(r, Source::Lattice, Topology::Triangles);
@@ -276,9 +281,8 @@ impl Terrain {
             }
             return record(r, 0..list.draws.len());
         }
-        let mut first = 0;
         let kind = |d: &Draw| (d.source, d.topology);
-        for run in list.draws.chunk_by(|a, b| kind(a) == kind(b)) {
+        for run in list.draws[first..].chunk_by(|a, b| kind(a) == kind(b)) {
             self.bind_geometry(r, run[0].source);
             self.bind_pipeline(r, run[0].source, run[0].topology);
             record(r, first..first + run.len());
@@ -376,17 +380,6 @@ fn driven(gpu: &Arc<Gpu>, driver: Option<&Driver>) -> Result<Option<Driven>> {
     driver.filter(|_| gpu.counts_draws).map(|driver| Driven::new(gpu, driver)).transpose()
 }
 
-fn command_bytes(draw: &Draw) -> [u8; COMMAND] {
-    let words = [
-        draw.indices.len() as u32,
-        draw.instances.len() as u32,
-        draw.indices.start,
-        draw.first_vertex,
-        draw.instances.start,
-    ];
-    bytemuck::cast(words)
-}
-
 impl Resident {
     fn new(gpu: &Arc<Gpu>, geometry: &Geometry) -> Result<Self> {
         let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
@@ -397,70 +390,6 @@ impl Resident {
             normals: filled(gpu, "vertex normals", cast_slice(&geometry.normals), vertex)?,
             indices: filled(gpu, "resident indices", cast_slice(&geometry.indices), index)?,
         })
-    }
-}
-
-impl Slot {
-    fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSet, limits: &Limits) -> Result<Self> {
-        use vk::BufferUsageFlags as Usage;
-        let host = |purpose, bytes: usize, usage| Buffer::host(gpu, purpose, bytes as u64, usage);
-        Ok(Self {
-            set,
-            frame: host("frame", size_of::<Frame>(), Usage::UNIFORM_BUFFER)?,
-            instances: host("instances", limits.instances * size_of::<Instance>(), Usage::VERTEX_BUFFER)?,
-            commands: host("indirect commands", limits.draws * COMMAND, Usage::INDIRECT_BUFFER)?,
-            vertices: host("streamed vertices", limits.vertices * size_of::<ExplicitVertex>(), Usage::VERTEX_BUFFER)?,
-            normals: host("streamed normals", limits.normals * size_of::<VertexNormals>(), Usage::VERTEX_BUFFER)?,
-            indices: host("streamed indices", limits.indices * 4, Usage::INDEX_BUFFER)?,
-            index_type: vk::IndexType::UINT32,
-            staging: host("upload staging", limits.upload_bytes, Usage::TRANSFER_SRC)?,
-        })
-    }
-
-    /// Writes the frame's streamed indices, 16 bits each if all of them fit.
-    fn write_indices(&mut self, indices: &[u32]) {
-        let highest = indices.iter().copied().filter(|&k| k != RESTART).fold(0, u32::max);
-        // The highest number of either kind ends a strip.
-        if highest < u32::from(u16::MAX) {
-            self.index_type = vk::IndexType::UINT16;
-            self.indices.write_short(indices);
-        } else {
-            self.index_type = vk::IndexType::UINT32;
-            self.indices.write(0, cast_slice(indices));
-        }
-    }
-
-    fn describe(
-        &self,
-        gpu: &Gpu,
-        images: &[Image; IMAGES],
-        samplers: &[Sampler; IMAGES],
-        maps: &TextureSlots,
-        table: &Buffer,
-    ) {
-        let table = [vk::DescriptorBufferInfo { buffer: table.raw, offset: 0, range: vk::WHOLE_SIZE }];
-        let frame = [vk::DescriptorBufferInfo { buffer: self.frame.raw, offset: 0, range: vk::WHOLE_SIZE }];
-        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-        let infos: Vec<_> = images
-            .iter()
-            .zip(samplers)
-            .chain([(&maps.image, &maps.sampler)])
-            .map(|(image, sampler)| {
-                let (sampler, image_view) = (sampler.raw, image.view);
-                [vk::DescriptorImageInfo { sampler, image_view, image_layout: layout }]
-            })
-            .collect();
-        let write = vk::WriteDescriptorSet::default().dst_set(self.set);
-        let mut writes =
-            vec![write.dst_binding(0).descriptor_type(vk::DescriptorType::UNIFORM_BUFFER).buffer_info(&frame)];
-        for (binding, info) in (1u32..).zip(&infos) {
-            let kind = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
-            writes.push(write.dst_binding(binding).descriptor_type(kind).image_info(info));
-        }
-        let kind = vk::DescriptorType::STORAGE_BUFFER;
-        writes.push(write.dst_binding(infos.len() as u32 + 1).descriptor_type(kind).buffer_info(&table));
-        // SAFETY: buffers and images live as long as the set.
-        unsafe { gpu.raw.update_descriptor_sets(&writes, &[]) };
     }
 }
 

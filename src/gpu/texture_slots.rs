@@ -124,7 +124,7 @@ pub struct Overlay {
 /// Whose texels they are.
 enum Parts {
     None,
-    Picture(PictureMaps),
+    Picture(Box<PictureMaps>),
     Ground(Box<GroundMaps>),
 }
 
@@ -140,7 +140,8 @@ impl Overlay {
             (Some(cut), _) => Parts::Ground(Box::new(GroundMaps::new(field, cut))),
             (None, Some((cut, picture))) => {
                 let texels = bytemuck::cast_slice(picture.as_raw());
-                Parts::Picture(PictureMaps::new(field, cut, Picture { size: picture.dimensions().into(), texels }))
+                let picture = Picture { size: picture.dimensions().into(), texels };
+                Parts::Picture(Box::new(PictureMaps::new(field, cut, picture)))
             }
             (None, None) => Parts::None,
         };

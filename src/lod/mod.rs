@@ -29,6 +29,12 @@ pub trait Technique: Send {
     /// Fills the (empty) list with what this view needs.
     fn select(&mut self, view: &View, list: &mut DrawList);
 
+    /// Fills the (empty) list as [`Self::select`] does, and calls `ready` each time more draws of it may be drawn while
+    /// the rest is being selected: what stands in the list stays there as it is.
+    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, _ready: &mut dyn FnMut(&DrawList)) {
+        self.select(view, list);
+    }
+
     /// How the device finds the draws itself, if it can: the same draws and instances as [`Self::select`], in any
     /// order.
     fn driver(&self) -> Option<&Driver> {

@@ -3,6 +3,7 @@
 pub mod capture;
 mod deep;
 pub mod holes;
+mod parts;
 pub mod probed;
 pub mod savings;
 
@@ -14,7 +15,8 @@ use anyhow::{Context, Result};
 use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::{Frames, Timing};
 use crate::gpu::pipelines::Pipelines;
-use crate::gpu::target::{self, Offscreen};
+use crate::gpu::slot::Part;
+use crate::gpu::target::Offscreen;
 use crate::gpu::terrain::Terrain;
 use crate::gpu::texture_slots::Figures;
 use crate::gpu::{Gpu, capture::Capture, floor::Floor, probe::Probe};
@@ -159,27 +161,22 @@ impl Stage {
     /// Selects and draws a view, and waits until the device has finished.
     pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let started = Instant::now();
-        self.select(technique, view);
-        let select_ms = ms(started);
-        let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         self.frames.counts_passed = copy == Copy::PictureAndDepth;
-        let mut recording = self.frames.begin()?;
-        let uploading = Instant::now();
-        self.terrain.overlay.look(&mut recording, view)?;
-        self.terrain.prepare(&mut recording, &frame, &self.list)?;
-        let upload_ms = ms(uploading);
+        let before = self.select_in_parts(technique, view)?;
+        let select_ms = ms(started);
         let recorded = Instant::now();
-        self.terrain.select(&mut recording, &self.list)?;
-        target::begin(&recording, self.offscreen.attachment(), deep::attachment(&self.plan, &self.offscreen));
-        self.terrain.draw(&mut recording, &self.list)?;
-        target::end(&recording);
+        let list = std::mem::take(&mut self.list);
+        let uploaded = self.record_part(view, &list, &Part { before, is_last: true });
+        self.list = list;
+        let upload_ms = uploaded?;
+        let recording = self.frames.resume();
         if copy != Copy::Nothing {
             self.offscreen.read_back(&recording);
         }
         if copy == Copy::PictureAndDepth && self.plan.has_depth() {
             self.offscreen.read_back_depth(&recording);
         }
-        let record_ms = ms(recorded);
+        let record_ms = ms(recorded) - upload_ms;
         self.frames.submit(None, None)?;
         self.frames.finish().context("drawing")?;
         self.read_draws();

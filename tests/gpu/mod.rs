@@ -16,6 +16,7 @@ mod maps;
 mod memory;
 mod neck;
 mod painter;
+mod parts;
 mod plan;
 mod skirts;
 mod soak;

@@ -16,10 +16,10 @@ use super::{aslant, mountains, on_device, shoot, technique};
 
 const SIZE: [u32; 2] = [96, 64];
 
-fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Stage {
+pub(super) fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Stage {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
-    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, SIZE).unwrap()
+    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, size).unwrap()
 }
 
 /// A technique's lists as they are, drawn without a depth buffer.
@@ -68,7 +68,7 @@ fn without_a_depth_buffer_no_pixel_differs_on_any_named_path() {
                 sorted(&[level, "order=painter"]),
                 Box::new(Painted(sorted(&[level, "order=front"]))),
             ];
-            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref()));
+            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref(), SIZE));
             for path in paths::PATHS {
                 let (mut wrong, mut land) = (0, 0);
                 for view in path.views(&field, 200, SIZE, tolerance).iter().step_by(19) {
@@ -97,7 +97,7 @@ fn depths_are_there_for_who_asks() {
         let view = aslant(&field, SIZE, 1.0);
         let [deep, painted] = ["order=back", "order=painter"].map(|order| {
             let mut technique = technique(&field, "sorted-strips", &[order]);
-            let mut stage = stage(gpu, &field, technique.as_ref());
+            let mut stage = stage(gpu, &field, technique.as_ref(), SIZE);
             stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
             assert_eq!(depth_bytes(gpu) > 0, order == "order=back");
             stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
@@ -117,7 +117,7 @@ fn a_probed_frame_is_painted_too() {
         let view = aslant(&field, SIZE, 1.0);
         let mut sorted = technique(&field, "sorted-strips", &["order=painter"]);
         let shown = shoot(gpu, &field, sorted.as_mut(), &view).picture;
-        let mut stage = stage(gpu, &field, sorted.as_ref());
+        let mut stage = stage(gpu, &field, sorted.as_ref(), SIZE);
         stage.draw_probed(sorted.as_mut(), "sorted-strips", &view).unwrap();
         assert_eq!(differing(&stage.picture(), &shown), 0);
         assert_eq!(depth_bytes(gpu), 0);
@@ -135,7 +135,7 @@ fn nearest_first_nothing_is_drawn_over() {
         view.world_from_eye = View::turned(-35.0, -3.0, 0.0);
         let passed = ["front", "shuffled", "back", "painter"].map(|order| {
             let mut technique = technique(&field, "sorted-strips", &[&format!("order={order}")]);
-            let mut stage = stage(gpu, &field, technique.as_ref());
+            let mut stage = stage(gpu, &field, technique.as_ref(), SIZE);
             let times = stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
             let covered = stage.picture().pixels().filter(|p| p.0[3] > 0).count() as u64;
             times.gpu.passed.map(|passed| (passed, covered))

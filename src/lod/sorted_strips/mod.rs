@@ -39,6 +39,7 @@ pub mod join;
 pub mod measure;
 pub mod order;
 pub mod pages;
+pub mod parts;
 pub mod sequence;
 pub mod shapes;
 pub mod splits;
@@ -109,6 +110,12 @@ pub const ENTRY: Entry = Entry {
             about: "three indices a triangle, or strips that end where the order of sight leaves them",
         },
         Setting {
+            key: "parts",
+            values: Values::Number(1.0, 64.0),
+            default: "1",
+            about: "parts of a frame with level=certified, each drawn while the next is walked: in pictures and times, not in the window",
+        },
+        Setting {
             key: "guard",
             values: Values::Number(0.0, 1000.0),
             default: "0.25",
@@ -150,6 +157,9 @@ struct SortedStrips {
     blends: bool,
     sequence: Sequence,
     topology: Topology,
+    /// The most parts of a frame, and one of them.
+    parts: usize,
+    part: DrawList,
     is_serial: bool,
     /// Of the last frame.
     triangles_before: usize,
@@ -165,11 +175,22 @@ impl SortedStrips {
         let cells = grid.side() as usize;
         let pages = (grid.count[0] * grid.count[1]) as usize;
         let topology = topology::of(settings.word("topology"));
-        let most_indices = 3 * (2 * pages * cells * cells).min(MOST_TRIANGLES);
+        let sequence = Sequence::of(settings.word("order"));
+        let level_is_certified = settings.word("level") == "certified";
+        // Others need all triangles at once, or have a level function whose triangles nobody counts before.
+        let comes_in_parts = level_is_certified && topology == Topology::Triangles && sequence != Sequence::Shuffled;
+        let parts = if comes_in_parts { settings.number("parts") as usize } else { 1 };
+        let [vertices, triangles] = if parts > 1 {
+            [parts::most_triangles(pages, pages * cells * cells / 3); 2]
+        } else {
+            [pages * (cells + 1) * (cells + 1), 2 * pages * cells * cells]
+        };
+        let most_indices = 3 * triangles.min(MOST_TRIANGLES);
+        let rows = grid.count[0].max(grid.count[1]) as usize;
         let limits = Limits {
-            draws: grid.count[0].max(grid.count[1]) as usize,
-            instances: grid.count[0].max(grid.count[1]) as usize,
-            vertices: (pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
+            draws: rows,
+            instances: rows,
+            vertices: vertices.min(MOST_TRIANGLES),
             indices: topology::most_indices(topology, most_indices),
             ..Limits::default()
         };
@@ -180,11 +201,13 @@ impl SortedStrips {
             pages: Pages::none(grid),
             splits: Splits::new(grid),
             workers: Vec::new(),
-            edge: (settings.word("level") == "uniform").then(|| settings.number("edge")),
+            edge: (!level_is_certified).then(|| settings.number("edge")),
             guard: settings.number("guard"),
-            blends: settings.word("blend") == "height" && settings.word("level") == "uniform",
-            sequence: Sequence::of(settings.word("order")),
+            blends: settings.word("blend") == "height" && !level_is_certified,
+            sequence,
             topology,
+            parts,
+            part: DrawList::default(),
             is_serial: settings.variant() == Some("serial"),
             triangles_before: 0,
             most_indices,
@@ -248,12 +271,46 @@ impl SortedStrips {
             let levels = if self.blends { levels.blending(self.pages.grid.level) } else { levels };
             return self.walk(&levels, gaze, rows, workers);
         }
+        if self.split(view) { self.walk(&self.splits, gaze, rows, workers) } else { None }
+    }
+
+    /// Splits the squares that the view's tolerance needs split; `false` if there are too many.
+    fn split(&mut self, view: &View) -> bool {
         self.splits.clear();
         let seen = guarded(view, self.guard);
         // A split square has at least six triangles more.
         let most = self.most_indices / 18 + 1;
-        let certified = Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most);
-        if certified.split(&mut self.splits) { self.walk(&self.splits, gaze, rows, workers) } else { None }
+        Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most).split(&mut self.splits)
+    }
+
+    /// Splits what the view's tolerance needs; whether the frame fits its limits whatever comes of that.
+    fn surely_fits(&mut self, view: &View) -> bool {
+        let fits = self.split(view);
+        let most = parts::most_triangles(self.pages.list().len(), self.splits.count());
+        fits && 3 * most <= self.most_indices && most <= self.limits.vertices
+    }
+
+    /// Walks group after group of rows; what is to be walked was split.
+    fn fill_in_parts(
+        &mut self,
+        (gaze, rows): (&Gaze, &[Row]),
+        workers: &mut [Worker],
+        list: &mut DrawList,
+        ready: &mut dyn FnMut(&DrawList),
+    ) {
+        let mut part = std::mem::take(&mut self.part);
+        let groups = parts::groups(rows, self.parts, self.sequence);
+        for (k, group) in groups.iter().enumerate() {
+            workers.iter_mut().for_each(|worker| worker.stream.clear());
+            let lengths = self.walk(&self.splits, gaze, group, workers).expect("room for all that may come");
+            part.clear();
+            self.fill(&lengths, workers, &mut part);
+            parts::append(&part, list);
+            if k + 1 < groups.len() {
+                ready(list);
+            }
+        }
+        self.part = part;
     }
 
     fn fill(&self, lengths: &[[usize; 2]], workers: &mut [Worker], list: &mut DrawList) {
@@ -295,6 +352,10 @@ impl Technique for SortedStrips {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.select_in_parts(view, list, &mut |_| ());
+    }
+
+    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
         self.look(view);
         let gaze = Gaze::new(&self.field, view);
         let rows = self.pages.rows(&gaze);
@@ -302,11 +363,15 @@ impl Technique for SortedStrips {
         workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
         let is_serial = self.is_serial || self.triangles_before < LEAST_PARALLEL;
         let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
-        let (lengths, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, of_frame));
-        self.fill(&lengths, of_frame, list);
+        if self.parts > 1 && self.surely_fits(view) {
+            self.fill_in_parts((&gaze, &rows), of_frame, list, ready);
+        } else {
+            let (lengths, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, of_frame));
+            self.fill(&lengths, of_frame, list);
+            list.widening = widening;
+        }
         self.workers = workers;
-        self.triangles_before = lengths.iter().map(|[_, indices]| indices / 3).sum();
-        list.widening = widening;
+        self.triangles_before = list.triangles() as usize;
     }
 
     fn keeps_tolerance(&self) -> bool {

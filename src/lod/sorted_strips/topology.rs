@@ -55,7 +55,7 @@ fn strips(triangles: &[[u32; 3]]) -> Vec<u32> {
 fn next_corner(strips: &[u32], triangle: &[u32; 3]) -> Option<u32> {
     let &[.., first, second] = strips else { return None };
     // Strips begin at even places, and every other triangle has its first two corners the other way round.
-    let side = if strips.len() % 2 == 0 { [first, second] } else { [second, first] };
+    let side = if strips.len().is_multiple_of(2) { [first, second] } else { [second, first] };
     opposite(triangle, side)
 }
 

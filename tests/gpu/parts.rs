@@ -1,0 +1,70 @@
+//! A frame in parts, each drawn by a submission of its own while the next is walked: the same picture to the bit.
+
+use cuesta::bench::paths;
+use cuesta::draw::DrawList;
+use cuesta::draw::expand;
+use cuesta::draw::layout::Frame;
+use cuesta::scene::Copy;
+use cuesta::view::{Metric, Tolerance};
+
+use super::painter::stage;
+use super::{mountains, on_device, technique};
+
+const SIZE: [u32; 2] = [96, 64];
+
+#[test]
+fn parts_show_what_the_whole_shows() {
+    on_device(|gpu| {
+        let field = mountains();
+        let tolerance = Tolerance { px: 0.5, metric: Metric::Certified };
+        for order in ["order=front", "order=back", "order=painter"] {
+            let mut drawn = ["parts=1", "parts=2", "parts=5"]
+                .map(|parts| technique(&field, "sorted-strips", &["page=16", order, parts]));
+            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref(), SIZE));
+            for view in paths::find("circle").unwrap().views(&field, 6, SIZE, tolerance) {
+                let mut pictures = [0, 1, 2].map(|k| {
+                    let times = stages[k].draw(drawn[k].as_mut(), &view, Copy::PictureAndDepth).unwrap();
+                    let passes = times.gpu.passes.iter().filter(|(name, _)| *name == "terrain").count();
+                    assert_eq!(passes, [1, 2, 5][k], "{order}: one pass a part");
+                    (stages[k].picture(), stages[k].depth())
+                });
+                pictures.sort_by_key(|(picture, _)| picture.pixels().filter(|p| p.0[3] > 0).count());
+                assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]), "{order}");
+                assert!(pictures[0].0.pixels().filter(|p| p.0[3] > 0).count() > 500, "{order}: land");
+            }
+        }
+    });
+}
+
+/// What is ready stays, and all of it is what comes at once otherwise.
+#[test]
+fn what_is_ready_is_the_beginning_of_the_whole() {
+    let field = mountains();
+    let tolerance = Tolerance { px: 0.5, metric: Metric::Certified };
+    for (order, serial) in [("order=front", ""), ("order=painter", ""), ("order=front", ":serial")] {
+        let name = format!("sorted-strips{serial}");
+        let [mut whole, mut parts] =
+            ["parts=1", "parts=4"].map(|parts| technique(&field, &name, &["page=16", order, parts]));
+        for view in paths::find("fly").unwrap().views(&field, 5, SIZE, tolerance) {
+            let (mut list, mut in_parts, mut ready) = (DrawList::default(), DrawList::default(), Vec::new());
+            whole.select(&view, &mut list);
+            parts.select_in_parts(&view, &mut in_parts, &mut |list| ready.push(list.clone()));
+            assert_eq!(ready.len(), 3, "{order}");
+            for begun in &ready {
+                assert!(!begun.draws.is_empty() && begun.draws.len() < in_parts.draws.len());
+                assert_eq!(begun.draws, in_parts.draws[..begun.draws.len()], "{order}");
+                let [begun, all] = [begun, &in_parts].map(|list| list.streamed.indices.as_slice());
+                assert_eq!(*begun, all[..begun.len()], "{order}");
+            }
+            let triangles = |list: &DrawList| -> Vec<_> {
+                let frame = Frame::placing(&field, &view);
+                let drawn = expand::triangles(&field, &frame, whole.resident(), list);
+                drawn.iter().map(|t| t.corners.map(|c| (c.x, c.z, c.y.to_bits()))).collect()
+            };
+            assert!(triangles(&list) == triangles(&in_parts), "{order}: the same ones in the same order");
+            if order == "order=front" {
+                assert_eq!((&list.draws, &list.streamed.indices), (&in_parts.draws, &in_parts.streamed.indices));
+            }
+        }
+    }
+}
