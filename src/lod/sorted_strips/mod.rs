@@ -35,7 +35,6 @@ pub mod blend;
 pub mod cave;
 pub mod certified;
 pub mod footprint;
-pub mod join;
 pub mod measure;
 pub mod order;
 pub mod pages;
@@ -56,7 +55,6 @@ use rayon::prelude::*;
 use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
-use self::join::join;
 use self::measure::Errors;
 use self::pages::{Gaze, Grid, Pages, Row};
 use self::sequence::Sequence;
@@ -336,10 +334,16 @@ impl SortedStrips {
     }
 }
 
-/// All streams, one after the other; indices count from the first vertex of their own.
+/// All streams, one after the other; indices count from the first vertex of their own. Both are about as many bytes: one
+/// core copies the vertices, and one the indices.
 fn join_streams(streams: &[&Stream], into: &mut Geometry) {
-    join(&streams.iter().map(|stream| stream.vertices.as_slice()).collect::<Vec<_>>(), &mut into.vertices);
-    join(&streams.iter().map(|stream| stream.indices.as_slice()).collect::<Vec<_>>(), &mut into.indices);
+    let Geometry { vertices, indices, .. } = into;
+    vertices.clear();
+    indices.clear();
+    rayon::join(
+        || streams.iter().for_each(|stream| vertices.extend_from_slice(&stream.vertices)),
+        || streams.iter().for_each(|stream| indices.extend_from_slice(&stream.indices)),
+    );
 }
 
 impl Technique for SortedStrips {

@@ -3,7 +3,6 @@
 
 use rayon::prelude::*;
 
-use super::join::join;
 use crate::draw::{Draw, DrawList, RESTART, Topology};
 
 /// The words of the setting.
@@ -33,7 +32,8 @@ pub fn arrange(topology: Topology, list: &mut DrawList) {
         draw.topology = Topology::Strip;
         first = draw.indices.end;
     }
-    join(&strips.iter().map(Vec::as_slice).collect::<Vec<_>>(), &mut list.streamed.indices);
+    list.streamed.indices.clear();
+    strips.iter().for_each(|strips| list.streamed.indices.extend_from_slice(strips));
 }
 
 fn strips(triangles: &[[u32; 3]]) -> Vec<u32> {
