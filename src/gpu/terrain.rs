@@ -16,9 +16,9 @@ use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
 use super::slot::{COMMAND, Part, Slot};
 use super::target::Formats;
-use super::texture_slots::{Overlay, TextureSlots};
-use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, RESTART, Source, Submission, Topology, Upload};
+use super::texture_slots::Overlay;
+use crate::draw::layout::{ExplicitVertex, Frame, VertexNormals};
+use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
