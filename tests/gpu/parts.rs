@@ -20,18 +20,22 @@ fn parts_show_what_the_whole_shows() {
         for order in ["order=front", "order=back", "order=painter"] {
             let mut drawn = ["parts=1", "parts=2", "parts=5"]
                 .map(|parts| technique(&field, "sorted-strips", &["page=16", order, parts]));
+            let (mut passes, mut land) = ([0; 3], 0);
             let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref(), SIZE));
-            for view in paths::find("circle").unwrap().views(&field, 6, SIZE, tolerance) {
-                let mut pictures = [0, 1, 2].map(|k| {
+            for view in paths::find("corner").unwrap().views(&field, 6, SIZE, tolerance) {
+                let pictures = [0, 1, 2].map(|k| {
                     let times = stages[k].draw(drawn[k].as_mut(), &view, Copy::PictureAndDepth).unwrap();
-                    let passes = times.gpu.passes.iter().filter(|(name, _)| *name == "terrain").count();
-                    assert_eq!(passes, [1, 2, 5][k], "{order}: one pass a part");
+                    let own = times.gpu.passes.iter().filter(|(name, _)| *name == "terrain").count();
+                    assert!((1..=[1, 2, 5][k]).contains(&own), "{order}: one pass a part");
+                    passes[k] += own;
                     (stages[k].picture(), stages[k].depth())
                 });
-                pictures.sort_by_key(|(picture, _)| picture.pixels().filter(|p| p.0[3] > 0).count());
                 assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]), "{order}");
-                assert!(pictures[0].0.pixels().filter(|p| p.0[3] > 0).count() > 500, "{order}: land");
+                land += pictures[0].0.pixels().filter(|p| p.0[3] > 0).count();
             }
+            assert!(land > 3000, "{order}: {land} pixels of land");
+            // Few rows of pages are in sight now and then: then there are fewer parts.
+            assert!(passes[0] == 6 && passes[1] > 9 && passes[2] > 15, "{order}: {passes:?}");
         }
     });
 }
@@ -45,11 +49,13 @@ fn what_is_ready_is_the_beginning_of_the_whole() {
         let name = format!("sorted-strips{serial}");
         let [mut whole, mut parts] =
             ["parts=1", "parts=4"].map(|parts| technique(&field, &name, &["page=16", order, parts]));
-        for view in paths::find("fly").unwrap().views(&field, 5, SIZE, tolerance) {
+        let mut parts_in_all = 0;
+        for view in paths::find("corner").unwrap().views(&field, 6, SIZE, tolerance) {
             let (mut list, mut in_parts, mut ready) = (DrawList::default(), DrawList::default(), Vec::new());
             whole.select(&view, &mut list);
             parts.select_in_parts(&view, &mut in_parts, &mut |list| ready.push(list.clone()));
-            assert_eq!(ready.len(), 3, "{order}");
+            assert!(ready.len() < 4, "{order}");
+            parts_in_all += ready.len() + 1;
             for begun in &ready {
                 assert!(!begun.draws.is_empty() && begun.draws.len() < in_parts.draws.len());
                 assert_eq!(begun.draws, in_parts.draws[..begun.draws.len()], "{order}");
@@ -66,5 +72,6 @@ fn what_is_ready_is_the_beginning_of_the_whole() {
                 assert_eq!((&list.draws, &list.streamed.indices), (&in_parts.draws, &in_parts.streamed.indices));
             }
         }
+        assert!(parts_in_all > 12, "{order}: {parts_in_all} parts");
     }
 }
