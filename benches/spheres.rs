@@ -4,7 +4,7 @@
 //! ROAM stands here twice: its priorities wait for the way that the viewpoint has really gone, which is the best that
 //! they can, and for that at the largest speed it may have, as published: here the fast path's.
 //! And what is selected and sent for a frame where triangles are streamed, and where blocks are kept on the device.
-//! `cargo bench --no-default-features --bench spheres`, while nothing else runs.
+//! `cargo bench --no-default-features --bench spheres`, while nothing else runs; with `-- 100000 leaping` that alone.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -182,11 +182,21 @@ fn main() {
     let mut field = synth::synth(synth::Kind::Fractal, [SIDE; 2], 7);
     field.spacing = [SPACING_M; 2];
     let measured = Measured::new(Arc::new(field), 1.0, &Progress::default());
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let is_meant = |name: &str, others: &[&str]| {
+        words.iter().any(|word| word == name) || !words.iter().any(|word| others.contains(&word.as_str()))
+    };
     for wedges in [10_000, 100_000, 1_000_000] {
+        if !is_meant(&wedges.to_string(), &["10000", "100000", "1000000"]) {
+            continue;
+        }
         let start = path(&measured, Some(FAST_M))[FRAMES];
         let px = tolerance(&measured, start, wedges);
         println!("{wedges} wedges, {px:.2} px");
         for (name, step) in [("slow", Some(SLOW_M)), ("fast", Some(FAST_M)), ("leaping", None)] {
+            if !is_meant(name, &["slow", "fast", "leaping"]) {
+                continue;
+            }
             let (path, reach) = (path(&measured, step), reach(px));
             println!("  {name}");
             let bounded = || {

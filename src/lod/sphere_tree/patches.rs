@@ -3,6 +3,22 @@
 //! A block in sight that changed is built anew. Where it came out the same, nothing is sent; else its triangles are
 //! uploaded whole. What a frame's uploads or the device's memory have no room for is streamed, so that nothing ever
 //! waits. Vertices that fade in change with every step of the eye: their blocks are all built anew.
+//!
+//! Bytes sent and selection's time, medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m above ground:
+//!
+//! | wedges (triangles in sight) | eye | streamed | patches |
+//! |---|---|---|---|
+//! | 10⁴ (4 k) | 0.05 m a frame | 129 kB, 0.86 ms | 4.9 kB, 0.28 ms |
+//! | | 5 m a frame | 111 kB, 0.86 ms | 46 kB, 0.56 ms |
+//! | | leaps | 119 kB, 4.1 ms | 111 kB, 3.6 ms |
+//! | 10⁵ (27 k) | 0.05 m a frame | 789 kB, 2.5 ms | 7.1 kB, 0.33 ms |
+//! | | 5 m a frame | 717 kB, 2.9 ms | 271 kB, 1.3 ms |
+//! | | leaps | 719 kB, 40 ms | 699 kB, 39 ms |
+//! | 10⁶ (251 k) | 0.05 m a frame | 6.8 MB, 23 ms | 86 kB, 1.0 ms |
+//! | | 5 m a frame | 5.9 MB, 22 ms | 2.8 MB, 13 ms |
+//!
+//! Where nearly all blocks change (tens of metres a frame) what is copied on the device is lost: on llvmpipe 7.1 instead of
+//! 5.2 ms of device time for 17 k triangles, 35 instead of 35 for 203 k.
 
 use std::ops::Range;
 
