@@ -309,7 +309,7 @@ fn command_buffer(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer>
 fn begin(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
     let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
     // SAFETY: the slot's fence says that its commands have ended, and its pool was reset.
-    Ok(unsafe { gpu.raw.begin_command_buffer(commands, &info)? })
+    unsafe { gpu.raw.begin_command_buffer(commands, &info) }.context("beginning a frame")
 }
 
 fn submit(gpu: &Gpu, commands: vk::CommandBuffer, info: vk::SubmitInfo2, fence: vk::Fence) -> Result<()> {

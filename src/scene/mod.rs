@@ -164,11 +164,10 @@ impl Stage {
         self.frames.counts_passed = copy == Copy::PictureAndDepth;
         let before = self.select_in_parts(technique, view)?;
         let select_ms = ms(started);
-        let recorded = Instant::now();
         let list = std::mem::take(&mut self.list);
-        let uploaded = self.record_part(view, &list, &Part { before, is_last: true });
+        let last = self.record_part(view, &list, &Part { before, is_last: true });
         self.list = list;
-        let upload_ms = uploaded?;
+        let (upload_ms, recorded) = last?;
         let recording = self.frames.resume();
         if copy != Copy::Nothing {
             self.offscreen.read_back(&recording);
@@ -176,7 +175,7 @@ impl Stage {
         if copy == Copy::PictureAndDepth && self.plan.has_depth() {
             self.offscreen.read_back_depth(&recording);
         }
-        let record_ms = ms(recorded) - upload_ms;
+        let record_ms = ms(recorded);
         self.frames.submit(None, None)?;
         self.frames.finish().context("drawing")?;
         self.read_draws();

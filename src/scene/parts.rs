@@ -36,9 +36,9 @@ impl Stage {
         self.frames.submit_part()
     }
 
-    /// Records a part of a list, or all of it, from the frame's begin on if it is the first one; how long it took to write
-    /// its data for the device and to record its uploads, milliseconds.
-    pub(super) fn record_part(&mut self, view: &View, list: &DrawList, part: &Part) -> Result<f64> {
+    /// Records a part of a list, or all of it, from the frame's begin on if it is the first one. How long it took to write its
+    /// data for the device and to record its uploads, milliseconds, and when the recording of commands began after that.
+    pub(super) fn record_part(&mut self, view: &View, list: &DrawList, part: &Part) -> Result<(f64, Instant)> {
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let (colour, depth) = (self.offscreen.attachment(), deep::attachment(&self.plan, &self.offscreen));
         let mut recording = if part.is_first() { self.frames.begin()? } else { self.frames.resume() };
@@ -47,7 +47,7 @@ impl Stage {
             self.terrain.overlay.look(&mut recording, view)?;
         }
         self.terrain.prepare_part(&mut recording, &frame, list, part)?;
-        let upload_ms = ms(started);
+        let (upload_ms, recorded) = (ms(started), Instant::now());
         self.terrain.select(&mut recording, list)?;
         if part.is_first() {
             target::begin(&recording, colour, depth);
@@ -56,6 +56,6 @@ impl Stage {
         }
         self.terrain.draw_part(&mut recording, list, part)?;
         target::end(&recording);
-        Ok(upload_ms)
+        Ok((upload_ms, recorded))
     }
 }
