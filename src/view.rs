@@ -307,10 +307,14 @@ impl Allowance {
     /// is the component of the world's up vector along the view axis. Visible points of the box have
     /// `z ≥ max(near, nearest depth, d/k)` and `r ≤ min(k·z, farthest horizontal distance)`, where `k` is
     /// the length of the ray through a picture corner at unit depth. This tightens and makes safe
-    /// Judnich & Ling's eq. 1, which is up to k² too small off the axis.
+    /// Judnich & Ling's eq. 1, which is up to k² too small off the axis. Under any finite tolerance what is drawn stays in
+    /// front of the eye; under an infinite one everything is allowed.
     pub fn error(&self, bounds: &Aabb) -> f64 {
         let View { eye, lens, near, tolerance, .. } = self.view;
         let (focal, px, forward) = (self.focal_px, tolerance.px, self.forward);
+        if px == f64::INFINITY {
+            return px;
+        }
         match (lens, tolerance.metric) {
             (Lens::Orthographic { .. }, Metric::Paper) => px / focal,
             (Lens::Orthographic { .. }, Metric::Certified) => {

@@ -160,22 +160,29 @@ const WIDENING: f64 = 1.5;
 
 /// What `select` makes of the view under its tolerance or, where it makes nothing because there is too much, under the first
 /// wider one; and what the tolerance was multiplied by. A wider tolerance never draws more, so that steps may be left out
-/// on the way: what is asked for may be a hundred powers of ten too fine. The last call is that of the answer.
+/// on the way: what is asked for may be a hundred powers of ten too fine. The last call is that of the answer. Where even the
+/// widest tolerance is too much, as it still keeps what is drawn in front of the eye, it is an infinite one, which keeps nothing.
+///
+/// # Panics
+/// If `select` makes nothing under an infinite tolerance.
 pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
     if let Some(selected) = select(view) {
         return (selected, 1.0);
     }
     let factor = |steps: i32| WIDENING.powi(steps);
-    let mut at = |steps: i32| {
-        let px = (view.tolerance.px.max(f64::MIN_POSITIVE) * factor(steps)).min(f64::MAX);
-        select(&View { tolerance: Tolerance { px, ..view.tolerance }, ..*view })
-    };
+    let px_at = |steps: i32| (view.tolerance.px.max(f64::MIN_POSITIVE) * factor(steps)).min(f64::MAX);
+    let mut under = |px: f64| select(&View { tolerance: Tolerance { px, ..view.tolerance }, ..*view });
     let [mut below, mut above] = [0, 1];
-    let mut selected = at(above);
+    let mut selected = under(px_at(above));
     while selected.is_none() {
+        if px_at(above) == f64::MAX {
+            let selected = under(f64::INFINITY).expect("nothing is too much where no tolerance is kept");
+            return (selected, f64::INFINITY);
+        }
         (below, above) = (above, 2 * above);
-        selected = at(above);
+        selected = under(px_at(above));
     }
+    let mut at = |steps: i32| under(px_at(steps));
     while above - below > 1 {
         let middle = below.midpoint(above);
         match at(middle) {
@@ -238,5 +245,7 @@ mod tests {
             }
         }
         assert!(widened(&view(1e-320), |view| (view.tolerance.px > 1.0).then_some(())).1 > 1e300);
+        let keeps_nothing = |view: &View| (view.tolerance.px == f64::INFINITY).then_some(());
+        assert_eq!(widened(&view(1.0), keeps_nothing).1, f64::INFINITY);
     }
 }

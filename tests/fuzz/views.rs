@@ -146,6 +146,23 @@ fn check(poses: &[Pose]) {
     }
 }
 
+/// Found by the test below: a picture of 2 × 185 pixels, 115° wide, in which no finite tolerance is wide enough.
+#[test]
+fn where_no_tolerance_is_wide_enough_none_is_kept() {
+    check(&[Pose {
+        pick: 1_017_535_600,
+        eye: [0.0, 212.0, 456_785.119140625],
+        look: Some([190_200.19921875, 204.55113483031053, 0.0]),
+        angles: [0.0; 3],
+        fov: 115.0,
+        size: [2, 185],
+        near: None,
+        ortho: None,
+        tolerance: Tolerance { px: 3.5, metric: Metric::Certified },
+        time_s: 7.0,
+    }]);
+}
+
 #[test]
 fn whatever_the_view_a_list_that_fits() {
     let generate = |random: &mut Rng| {

@@ -23,9 +23,13 @@ impl Reach {
     /// Certified: with [`Allowance::error`](crate::view::Allowance::error)'s terms, all that can be seen at a distance d
     /// lies at a depth of at least max(near, d/k), no further aside than k times its depth, so that an error up to
     /// τ·depth / (f·k + τ) moves it by τ pixels at most. The distance is thus k·(f·k + τ)/τ times the error.
-    /// The paper's metric: f/τ times the error. In parallel projection an error is tolerated everywhere or nowhere.
+    /// The paper's metric: f/τ times the error. In parallel projection an error is tolerated everywhere or nowhere; under an
+    /// infinite tolerance everywhere.
     pub fn new(view: &View) -> Self {
         let (focal, px) = (view.focal_px(), view.tolerance.px);
+        if px == f64::INFINITY {
+            return Self { per_error: 0.0, harmless: px };
+        }
         match (view.lens, view.tolerance.metric) {
             (Lens::Perspective { .. }, Metric::Certified) => {
                 let corner = view.corner_ray();
