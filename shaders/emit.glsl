@@ -15,10 +15,11 @@ void capture(ivec2 at, float height) {
 }
 #endif
 
+// `at`: in parts of a sample, as the frame says.
 void emit_vertex(ivec2 at, float height, uint level, uint batch) {
     out_relative = relative_position(at, height);
     // Relative to the anchor: exact near the eye, however large the field.
-    out_lattice = vec2(at - frame.anchor);
+    out_lattice = from_anchor(at);
     out_level_batch = uvec2(level, batch);
     gl_Position = frame.clip_from_relative * vec4(out_relative, 1.0);
 #ifdef CAPTURE

@@ -19,9 +19,8 @@ layout(location = 3) out vec3 out_normal;
 
 void main() {
     Instance instance = instance_attributes();
-    ivec2 at = lattice_position(instance, turned_position(instance, in_position));
     ExplicitVertex vertex = ExplicitVertex(in_position, in_height, in_target, in_further, in_morph, in_regions);
-    emit_vertex(at, explicit_height(instance, vertex), instance.level, instance.batch);
+    emit_vertex(explicit_position(instance, vertex), explicit_height(instance, vertex), instance.level, instance.batch);
 #ifdef NORMALS
     out_normal = explicit_normal(instance, vertex, VertexNormals(in_normals.x, in_normals.y, in_normals.z));
 #endif

@@ -18,7 +18,7 @@ layout(set = 1, binding = 2, scalar) writeonly buffer ErrorBlock { TriangleError
 layout(set = 1, binding = 3, scalar) buffer HistogramBlock { uint histogram[2][4096]; };
 layout(push_constant, scalar) uniform InputBlock { OracleInput given; };
 
-// Twice the area in plan; positive if it faces up. Positions relative to a corner: no overflow.
+// Twice the area in plan; positive if it faces up. Positions, in parts of a sample, relative to a corner: no overflow.
 int doubled_area(ivec2 a, ivec2 b, ivec2 c) {
     ivec2 p = b - a, q = c - a;
     return p.y * q.x - p.x * q.y;
@@ -56,25 +56,28 @@ void main() {
         area = -area;
     }
     TriangleError found = TriangleError(0, 0.0, 0.0, 0.0, 0.0);
-    ivec2 first = min(a.position, min(b.position, c.position));
-    ivec2 last = max(a.position, max(b.position, c.position));
+    // Samples: the first at or after the triangle's western and northern ends, the last at or before the others.
+    int unit = 1 << frame.fraction_bits;
+    ivec2 first = (min(a.position, min(b.position, c.position)) + (unit - 1)) >> frame.fraction_bits;
+    ivec2 last = max(a.position, max(b.position, c.position)) >> frame.fraction_bits;
     for (int z = first.y; z <= last.y; ++z) {
         for (int x = first.x; x <= last.x; ++x) {
-            ivec2 at = ivec2(x, z);
-            ivec3 weights = ivec3(doubled_area(at, b.position, c.position), doubled_area(a.position, at, c.position),
-                                  doubled_area(a.position, b.position, at));
+            ivec2 at = ivec2(x, z), fine = at * unit;
+            ivec3 weights = ivec3(doubled_area(fine, b.position, c.position),
+                                  doubled_area(a.position, fine, c.position),
+                                  doubled_area(a.position, b.position, fine));
             if (any(lessThan(weights, ivec3(0)))) continue;
             if (HOLES && texelFetch(hole_pages, texel(at), 0).r != 0) continue;
             float truth = surface_height(at, faces_down);
             // Relative to the sample: heights nearly cancel before they are rounded.
             vec3 above = vec3(a.height, b.height, c.height) - truth;
             float metres = dot(vec3(weights), above) / float(area);
-            vec3 relative = relative_position(at, truth) + vec3(0.0, metres, 0.0);
+            vec3 relative = relative_position(fine, truth) + vec3(0.0, metres, 0.0);
             vec4 clip = frame.clip_from_relative * vec4(relative, 1.0);
             if (!in_view(clip)) continue;
             ivec2 towards = ivec2(at.x < frame.last.x ? 1 : -1, at.y < frame.last.y ? 1 : -1);
-            bool counts = owns_side(at, b.position, c.position, towards) && owns_side(at, c.position, a.position, towards)
-                && owns_side(at, a.position, b.position, towards);
+            bool counts = owns_side(fine, b.position, c.position, towards)
+                && owns_side(fine, c.position, a.position, towards) && owns_side(fine, a.position, b.position, towards);
             float px = displacement_px(clip, -metres);
             metres = abs(metres);
             found.largest_m = max(found.largest_m, metres);

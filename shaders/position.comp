@@ -21,11 +21,10 @@ void main() {
     ExplicitVertex vertex = query.vertex;
     if (query.explicit_height == 0) {
         Placed placed = placed(query.instance, vertex.position);
-        answers[k] = Answer(relative_position(placed.at, placed.height), vec3(0.0));
+        answers[k] = Answer(relative_position(placed.at << frame.fraction_bits, placed.height), vec3(0.0));
     } else {
         float height = explicit_height(query.instance, vertex);
-        ivec2 turned = turned_position(query.instance, vertex.position);
-        vec3 position = relative_position(lattice_position(query.instance, turned), height);
+        vec3 position = relative_position(explicit_position(query.instance, vertex), height);
         answers[k] = Answer(position, explicit_normal(query.instance, vertex, query.normals));
     }
 }

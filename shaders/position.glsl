@@ -101,14 +101,31 @@ ivec2 lattice_position(Instance instance, ivec2 turned) {
     return min(instance.origin + scaled(instance, turned), frame.last);
 }
 
-vec2 relative_plan(ivec2 at) {
-    precise vec2 plan = vec2(at - frame.anchor) * frame.spacing;
+ivec2 explicit_position(Instance instance, ExplicitVertex vertex) {
+    ivec2 origin = instance.origin << frame.fraction_bits;
+    return min(origin + scaled(instance, turned_position(instance, vertex.position)), frame.last << frame.fraction_bits);
+}
+
+vec2 from_anchor(ivec2 at) {
+    int unit = 1 << frame.fraction_bits;
+    ivec2 whole = (at >> frame.fraction_bits) - frame.anchor;
+    precise vec2 part = vec2(at & (unit - 1)) * (1.0 / float(unit));
+    precise vec2 samples = vec2(whole) + part;
+    return samples;
+}
+
+vec2 relative_to_eye(vec2 from_anchor) {
+    precise vec2 plan = from_anchor * frame.spacing;
     precise vec2 moved = plan + frame.anchor_relative;
     return moved;
 }
 
+vec2 relative_plan(ivec2 at) {
+    return relative_to_eye(vec2(at - frame.anchor));
+}
+
 vec3 relative_position(ivec2 at, float height) {
-    vec2 plan = relative_plan(at);
+    vec2 plan = relative_to_eye(from_anchor(at));
     precise float above = height - frame.anchor_height;
     precise float y = above + frame.anchor_height_relative;
     return vec3(plan.x, y, plan.y);

@@ -65,7 +65,7 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     let mut technique = args.technique.build(common, &field)?;
     let mut list = DrawList::default();
     technique.select(&view, &mut list);
-    let mut mesh = MeshBuilder::new(&field);
+    let mut mesh = MeshBuilder::new(&field, list.fraction_bits);
     let frame = Frame::placing(&field, &view);
     expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));
     expand::skirts(&field, &frame, technique.resident(), &list).iter().for_each(|t| mesh.add(&t.corners));
@@ -79,13 +79,19 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
 /// Collects triangles and shares their vertices.
 struct MeshBuilder<'a> {
     field: &'a Field,
+    fraction_bits: u32,
     known: HashMap<(i32, i32, u32), u32>,
     mesh: Mesh,
 }
 
 impl<'a> MeshBuilder<'a> {
-    fn new(field: &'a Field) -> Self {
-        Self { field, known: HashMap::new(), mesh: Mesh { positions: Vec::new(), triangles: Vec::new() } }
+    fn new(field: &'a Field, fraction_bits: u32) -> Self {
+        Self {
+            field,
+            fraction_bits,
+            known: HashMap::new(),
+            mesh: Mesh { positions: Vec::new(), triangles: Vec::new() },
+        }
     }
 
     fn add(&mut self, corners: &surface::Triangle) {
@@ -96,7 +102,7 @@ impl<'a> MeshBuilder<'a> {
     fn vertex(&mut self, corner: &Corner) -> u32 {
         let positions = &mut self.mesh.positions;
         *self.known.entry((corner.x, corner.z, corner.y.to_bits())).or_insert_with(|| {
-            positions.push(self.field.world_at(f64::from(corner.x), f64::from(corner.z), f64::from(corner.y)));
+            positions.push(surface::world(self.field, corner, self.fraction_bits));
             positions.len() as u32 - 1
         })
     }

@@ -1,7 +1,7 @@
 //! From a draw list to its triangles, on the CPU: what the device draws, without a device.
 
 use super::layout::Frame;
-use super::place::{explicit_height, lattice_position, placed, turned_position};
+use super::place::{explicit_height, explicit_position, placed};
 use super::skirts::is_skirted;
 use super::{Draw, DrawList, Geometry, Instance, RESTART, Source, Topology};
 use crate::height::Field;
@@ -18,7 +18,8 @@ pub struct Drawn {
 
 /// Calls `visit` for every triangle of the list that is not degenerate in plan.
 ///
-/// `frame` needs only its placing part ([`Frame::placing`]).
+/// `frame` needs only its placing part ([`Frame::placing`]). Corners' positions have the list's
+/// [`fraction_bits`](DrawList::fraction_bits).
 pub fn visit_triangles(
     field: &Field,
     frame: &Frame,
@@ -79,6 +80,7 @@ fn each_triangle(
     mut visit: impl FnMut(Drawn),
 ) {
     let geometry = geometry(draw.source, resident, list);
+    let frame = &Frame { fraction_bits: list.fraction_bits as i32, ..*frame };
     let placed = |instance: u32| &list.instances[instance as usize];
     let corner = |instance, index| corner(field, frame, geometry, draw.source, placed(instance), index);
     assemble(geometry, draw, corner, |instance, corners| visit(Drawn { corners, instance }));
@@ -127,12 +129,12 @@ fn corner(
     match source {
         Source::Lattice => {
             let placed = placed(field, frame, instance, geometry.lattice[index as usize].position);
-            let [x, z] = placed.at;
+            let [x, z] = placed.at.map(|n| n << frame.fraction_bits);
             Corner { x, z, y: placed.height }
         }
         Source::Resident | Source::Streamed => {
             let vertex = &geometry.vertices[index as usize];
-            let [x, z] = lattice_position(frame, instance, turned_position(instance, vertex.position));
+            let [x, z] = explicit_position(frame, instance, vertex);
             Corner { x, z, y: explicit_height(instance, vertex) }
         }
     }

@@ -84,6 +84,8 @@ shared! {
         detail_first: vec2,
         /// Repetitions of the ground's materials a sample (x, z).
         detail_scale: vec2,
+        /// Bits of corners' positions that are parts of a sample: the list's.
+        fraction_bits: int,
     }
 
     /// A lattice mesh placed on the field.
@@ -112,7 +114,7 @@ shared! {
 
     /// A vertex that carries its own height.
     struct ExplicitVertex {
-        /// Lattice position (finest samples).
+        /// Lattice position: finest samples, or parts of them, see `Frame::fraction_bits`.
         position: ivec2,
         /// Height, metres.
         height: float,
@@ -139,7 +141,7 @@ shared! {
 
     /// What the vertex program made of a vertex, when it is captured.
     struct Captured {
-        /// Lattice position (finest samples).
+        /// Lattice position: finest samples, or parts of them, see `Frame::fraction_bits`.
         position: ivec2,
         /// Height, metres.
         height: float,

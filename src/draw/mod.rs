@@ -160,6 +160,9 @@ pub struct DrawList {
     pub instances: Vec<Instance>,
     /// Geometry of this frame only.
     pub streamed: Geometry,
+    /// Bits of explicit vertices' positions that are parts of a sample: 0 where all lie on samples. The corners of the
+    /// list's triangles have as many, whatever their source.
+    pub fraction_bits: u32,
     /// Changes to the resident geometry.
     pub uploads: Vec<Upload>,
     /// How the draws reach the device.
@@ -268,6 +271,7 @@ impl Default for DrawList {
             draws: Vec::new(),
             instances: Vec::new(),
             streamed: Geometry::default(),
+            fraction_bits: 0,
             uploads: Vec::new(),
             submission: Submission::default(),
             parameters: Vec::new(),
@@ -286,6 +290,7 @@ impl DrawList {
         self.streamed.vertices.clear();
         self.streamed.normals.clear();
         self.streamed.indices.clear();
+        self.fraction_bits = 0;
         self.uploads.clear();
         self.submission = Submission::default();
         self.parameters.clear();

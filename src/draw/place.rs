@@ -266,15 +266,39 @@ pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
     morphed_height(vertex.height, morphed_height(vertex.target, vertex.further, further), weight)
 }
 
-/// Position relative to the eye in metres, world axes, of a lattice position and height.
+/// Where an instance draws a vertex that carries its own height: its position in samples, or as the frame says in parts
+/// of them.
+pub fn explicit_position(frame: &Frame, instance: &Instance, vertex: &ExplicitVertex) -> [i32; 2] {
+    let turned = turned_position(instance, vertex.position);
+    [0, 1].map(|k| {
+        let origin = instance.origin[k] << frame.fraction_bits;
+        (origin + scaled(instance, turned[k])).min(frame.last[k] << frame.fraction_bits)
+    })
+}
+
+/// Position relative to the eye in metres, world axes, of a corner: its position, as [`explicit_position`] tells it, and
+/// its height.
 pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
-    let [x, z] = relative_plan(frame, at);
+    let [x, z] = relative_to_eye(frame, from_anchor(frame, at));
     [x, (height - frame.anchor_height) + frame.anchor_height_relative, z]
 }
 
-/// The same in plan (x, z).
+/// From the anchor to a corner's position, samples: whole ones are exact however far away the anchor is from the field.
+pub fn from_anchor(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
+    let unit = 1 << frame.fraction_bits;
+    [0, 1].map(|k| {
+        let whole = (at[k] >> frame.fraction_bits) - frame.anchor[k];
+        whole as f32 + (at[k] & (unit - 1)) as f32 * (1.0 / unit as f32)
+    })
+}
+
+/// From the eye to a lattice position in plan (x, z), metres.
 pub fn relative_plan(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
-    [0, 1].map(|k| (at[k] - frame.anchor[k]) as f32 * frame.spacing[k] + frame.anchor_relative[k])
+    relative_to_eye(frame, [0, 1].map(|k| (at[k] - frame.anchor[k]) as f32))
+}
+
+fn relative_to_eye(frame: &Frame, from_anchor: [f32; 2]) -> [f32; 2] {
+    [0, 1].map(|k| from_anchor[k] * frame.spacing[k] + frame.anchor_relative[k])
 }
 
 /// Height between two shapes: `weight` 0 is the finer one, 1 the coarser one, both to the bit.

@@ -82,7 +82,8 @@ impl Slot {
     pub fn write(&mut self, frame: &Frame, list: &DrawList, part: &Part) {
         let before = &part.before;
         if part.is_first() {
-            self.frame.write(0, bytemuck::bytes_of(frame));
+            let frame = Frame { fraction_bits: list.fraction_bits as i32, ..*frame };
+            self.frame.write(0, bytemuck::bytes_of(&frame));
         }
         append(&mut self.instances, before.instances, &list.instances);
         append(&mut self.vertices, before.vertices, &list.streamed.vertices);

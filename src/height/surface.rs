@@ -1,13 +1,15 @@
-//! Surfaces over the lattice: triangles whose corners lie on samples' positions, and how far they are from
-//! the samples inside them.
+//! Surfaces over the lattice: triangles whose corners lie on samples' positions, or between them on a finer lattice, and
+//! how far they are from the samples inside them.
 
 use std::ops::RangeInclusive;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{Field, rtin};
 
-/// A corner of a drawn triangle: lattice position (finest samples) and height, metres.
+/// A corner of a drawn triangle: lattice position and height, metres. Positions are in samples, or, where *fraction bits*
+/// are said, in 2^−bits samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Corner {
     /// East.
@@ -28,9 +30,20 @@ pub fn doubled_area([a, b, c]: &Triangle) -> i64 {
     bz * cx - bx * cz
 }
 
-/// Calls `visit(x, z, y)` for every lattice position inside or on the border of an up-facing triangle,
-/// with the triangle's height there.
-pub fn visit_samples(triangle: &Triangle, mut visit: impl FnMut(u32, u32, f64)) {
+/// World position of a corner with so many fraction bits.
+pub fn world(field: &Field, corner: &Corner, fraction_bits: u32) -> DVec3 {
+    let [x, z] = [corner.x, corner.z].map(|n| f64::from(n) / f64::from(1u32 << fraction_bits));
+    field.world_at(x, z, f64::from(corner.y))
+}
+
+/// Calls `visit(x, z, y)` for every sample's position inside or on the border of an up-facing triangle, with the
+/// triangle's height there.
+pub fn visit_samples(triangle: &Triangle, visit: impl FnMut(u32, u32, f64)) {
+    visit_samples_between(triangle, 0, visit);
+}
+
+/// The same for corners with so many fraction bits.
+pub fn visit_samples_between(triangle: &Triangle, fraction_bits: u32, mut visit: impl FnMut(u32, u32, f64)) {
     let area = doubled_area(triangle);
     debug_assert!(area > 0, "faces up: {triangle:?}");
     // Edge functions w = wx·x + wz·z + w0, each zero on the edge opposite its corner.
@@ -41,9 +54,13 @@ pub fn visit_samples(triangle: &Triangle, mut visit: impl FnMut(u32, u32, f64)) 
     let [a, b, c] = triangle;
     let edges = [edge(b, c), edge(c, a), edge(a, b)];
     let heights = triangle.map(|corner| f64::from(corner.y));
-    let (west, east) = (i64::from(a.x.min(b.x).min(c.x)), i64::from(a.x.max(b.x).max(c.x)));
-    for z in a.z.min(b.z).min(c.z)..=a.z.max(b.z).max(c.z) {
-        let row = edges.map(|(wx, wz, w0)| [wx, wz * i64::from(z) + w0]);
+    let samples = |n: [i32; 3]| {
+        let (least, most) = (n[0].min(n[1]).min(n[2]), n[0].max(n[1]).max(n[2]));
+        (-i64::from(-least >> fraction_bits), i64::from(most >> fraction_bits))
+    };
+    let ((west, east), (north, south)) = (samples([a.x, b.x, c.x]), samples([a.z, b.z, c.z]));
+    for z in north..=south {
+        let row = edges.map(|(wx, wz, w0)| [wx << fraction_bits, wz * (z << fraction_bits) + w0]);
         for x in span(&row, west, east) {
             let weight = |k: usize| (row[k][0] * x + row[k][1]) as f64;
             let y = (weight(0) * heights[0] + weight(1) * heights[1] + weight(2) * heights[2]) / area as f64;
@@ -132,15 +149,22 @@ mod tests {
 
     #[test]
     fn samples_of_a_triangle_by_brute_force() {
-        let triangle = [corner(1, 2, 3.0), corner(4, 11, -5.0), corner(9, 4, 7.5)];
+        visits_what_lies_inside([corner(1, 2, 3.0), corner(4, 11, -5.0), corner(9, 4, 7.5)], 0);
+        // Between samples, on them, and with none inside.
+        visits_what_lies_inside([corner(7, 9, 3.0), corner(17, 71, -5.0), corner(75, 19, 7.5)], 2);
+        visits_what_lies_inside([corner(8, 8, 3.0), corner(16, 80, -5.0), corner(150, 16, 7.5)], 3);
+        visits_what_lies_inside([corner(65, 65, 3.0), corner(66, 120, -5.0), corner(127, 70, 7.5)], 6);
+    }
+
+    fn visits_what_lies_inside(triangle: Triangle, fraction_bits: u32) {
         let area = doubled_area(&triangle) as f64;
         assert!(area > 0.0);
         let mut visited = Vec::new();
-        visit_samples(&triangle, |x, z, y| visited.push((x as i32, z as i32, y)));
+        visit_samples_between(&triangle, fraction_bits, |x, z, y| visited.push((x as i32, z as i32, y)));
         let mut expected = Vec::new();
         for z in 0..20 {
             for x in 0..20 {
-                let p = corner(x, z, 0.0);
+                let p = corner(x << fraction_bits, z << fraction_bits, 0.0);
                 let [a, b, c] = triangle;
                 let w = [[p, b, c], [a, p, c], [a, b, p]].map(|t| doubled_area(&t));
                 if w.iter().all(|w| *w >= 0) {

@@ -13,7 +13,7 @@ use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::draw::{Draw, DrawList, Geometry};
 use crate::height::Field;
-use crate::height::surface::Triangle;
+use crate::height::surface::{self, Triangle};
 use crate::view::View;
 
 /// Powers of two, px², between which the histogram has its bins: from 1/256 px² to more than any picture has.
@@ -122,16 +122,16 @@ impl<'a> Screen<'a> {
     fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Economy {
         let mut economy = Economy::new();
         expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle| {
-            economy.add(self.seen(&triangle.corners));
+            economy.add(self.seen(&triangle.corners, list.fraction_bits));
         });
         economy
     }
 
     /// The area, pixels, that a triangle has in the picture, negative if it faces away, and whether it is hidden;
     /// `None` if it lies outside.
-    fn seen(&self, triangle: &Triangle) -> Option<(f64, bool)> {
-        let corners = triangle.map(|corner| {
-            let point = self.field.world_at(corner.x.into(), corner.z.into(), corner.y.into());
+    fn seen(&self, triangle: &Triangle, fraction_bits: u32) -> Option<(f64, bool)> {
+        let corners = triangle.each_ref().map(|corner| {
+            let point = surface::world(self.field, corner, fraction_bits);
             self.clip_from_relative * (point - self.view.eye).extend(1.0)
         });
         let [w, h] = self.view.size.map(f64::from);

@@ -97,9 +97,9 @@ impl Meter<'_> {
         let last = self.field.size().map(|n| n as i32 - 1);
         let frame = Frame::placing(self.field, state.view);
         expand::visit_draw(self.field, &frame, state.resident, state.list, part, &mut |drawn| {
-            let triangle = facing_up(&drawn.corners);
-            surface::visit_samples(&triangle, |x, z, y| {
-                if owns(&triangle, [x as i32, z as i32], last) && !self.field.is_hole(x, z) {
+            let (triangle, bits) = (facing_up(&drawn.corners), state.list.fraction_bits);
+            surface::visit_samples_between(&triangle, bits, |x, z, y| {
+                if owns(&triangle, bits, [x as i32, z as i32], last) && !self.field.is_hole(x, z) {
                     visit(x, z, y);
                 }
             });

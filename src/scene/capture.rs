@@ -68,7 +68,8 @@ impl Stage {
             let frame = stage.look.frame(&stage.field, view, stage.range);
             for some in surface.chunks(oracle::TRIANGLES) {
                 let mut recording = stage.frames.begin()?;
-                stage.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
+                let nothing = DrawList { fraction_bits: list.fraction_bits, ..DrawList::default() };
+                stage.terrain.prepare(&mut recording, &frame, &nothing)?;
                 let scene = stage.terrain.scene_set(&recording);
                 oracle.record(&mut recording, scene, view.size, some)?;
                 stage.frames.submit(None, None)?;

@@ -63,13 +63,13 @@ pub fn all_numbers(field: &Field, technique: &dyn Technique, view: &View, list: 
     if let Some(instance) = list.instances.iter().find(|instance| !has_weights(instance)) {
         return Err(format!("weights {:x?} of the instance at {:?}", instance.weights, instance.origin));
     }
-    let frame = Frame::placing(field, view);
+    let frame = Frame { fraction_bits: list.fraction_bits as i32, ..Frame::placing(field, view) };
     let mut wrong = None;
     expand::visit_triangles(field, &frame, technique.resident(), list, |triangle| {
         for corner in triangle.corners {
             let relative = crate::draw::place::relative_position(&frame, [corner.x, corner.z], corner.y);
             if !relative.into_iter().chain([corner.y]).all(is_plain) {
-                wrong = Some(format!("sample ({}, {}) is drawn at {relative:?}", corner.x, corner.z));
+                wrong = Some(format!("corner ({}, {}) is drawn at {relative:?}", corner.x, corner.z));
             }
         }
     });

@@ -123,9 +123,10 @@ impl Subject<'_> {
         list
     }
 
-    fn drawn(&mut self, view: &View) -> Result<Vec<Drawn>, String> {
-        let list = self.select(view)?;
-        Ok(expand::triangles(self.field, &Frame::placing(self.field, view), self.technique.resident(), &list))
+    /// The triangles of a view, and how many fraction bits their corners have.
+    fn drawn(&mut self, view: &View) -> Result<(Vec<Drawn>, u32), String> {
+        let (list, frame) = (self.select(view)?, Frame::placing(self.field, view));
+        Ok((expand::triangles(self.field, &frame, self.technique.resident(), &list), list.fraction_bits))
     }
 
     /// Runs a check in every view and names the view that breaks it.
@@ -158,8 +159,10 @@ fn everything_in_sight(subject: &mut Subject) -> Result<(), Broken> {
     subject.in_every_view(|subject, view| {
         let [w, h] = subject.field.size();
         let mut covered = vec![false; (w * h) as usize];
-        for triangle in subject.drawn(view)?.iter().filter(|t| surface::doubled_area(&t.corners) > 0) {
-            surface::visit_samples(&triangle.corners, |x, z, _| covered[(z * w + x) as usize] = true);
+        let (triangles, bits) = subject.drawn(view)?;
+        for triangle in triangles.iter().filter(|t| surface::doubled_area(&t.corners) > 0) {
+            let cover = |x, z, _| covered[(z * w + x) as usize] = true;
+            surface::visit_samples_between(&triangle.corners, bits, cover);
         }
         let open = |&k: &u32| !covered[k as usize] && in_view(view, subject.field.world(k % w, k / w));
         let missing = land.iter().find(|&k| open(k));
@@ -223,11 +226,11 @@ fn same_after_a_journey(subject: &mut Subject, view: &View, away: &View, uploads
     let elsewhere = View { eye: view.eye + DVec3::X * ELSEWHERE_M, ..*view };
     subject.select_once(&elsewhere);
     let list = subject.select(view)?;
-    let drawn = if uploads { sorted(subject.drawn(view)?) } else { Vec::new() };
+    let drawn = if uploads { sorted(subject.drawn(view)?.0) } else { Vec::new() };
     subject.select(away)?;
     subject.select_once(&elsewhere);
     let list_again = subject.select(view)?;
-    Ok(if uploads { drawn == sorted(subject.drawn(view)?) } else { same_list(&list, &list_again) })
+    Ok(if uploads { drawn == sorted(subject.drawn(view)?.0) } else { same_list(&list, &list_again) })
 }
 
 fn same_list(a: &DrawList, b: &DrawList) -> bool {
@@ -280,7 +283,8 @@ fn wider_never_more(subject: &mut Subject) -> Result<(), Broken> {
 fn holes_stay_holes(subject: &mut Subject) -> Result<(), Broken> {
     subject.in_every_view(|subject, view| {
         let mut boxes: HashMap<u32, [i32; 4]> = HashMap::new();
-        for triangle in subject.drawn(view)? {
+        let (triangles, bits) = subject.drawn(view)?;
+        for triangle in triangles {
             let [west, north, east, south] = boxes.entry(triangle.instance).or_insert([i32::MAX, i32::MAX, 0, 0]);
             for corner in triangle.corners {
                 (*west, *north) = (corner.x.min(*west), corner.z.min(*north));
@@ -288,6 +292,8 @@ fn holes_stay_holes(subject: &mut Subject) -> Result<(), Broken> {
             }
         }
         boxes.values().try_for_each(|&[west, north, east, south]| {
+            let [west, north] = [west, north].map(|n| n >> bits);
+            let [east, south] = [east, south].map(|n| -(-n >> bits));
             let land = has_land(subject.field, [west, north], [east, south]);
             ensure(land, || format!("nothing but holes in ({west}, {north}) to ({east}, {south})"))
         })

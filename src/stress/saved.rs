@@ -14,6 +14,7 @@ use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
 use crate::height::Field;
 use crate::height::save::{replace, save};
+use crate::height::surface::Triangle;
 use crate::measure::watertight::write_ply;
 use crate::view::{Lens, Metric, View};
 
@@ -48,9 +49,9 @@ pub fn counter_example(
     let file = |extension: &str| folder.join(format!("{name}.{extension}"));
     let (land, text, mesh, picture) = (file("tif"), file("txt"), file("ply"), file("png"));
     save(&field, &land)?;
-    let mesh_of = mesh_of(&field, form, &broken.view.1);
+    let (mesh_of, bits) = mesh_of(&field, form, &broken.view.1);
     let written = |path: &Path| path.display().to_string();
-    replace(&mesh, |out| write_ply(&field, &mesh_of, out)).with_context(|| written(&mesh))?;
+    replace(&mesh, |out| write_ply(&field, &mesh_of, bits, out)).with_context(|| written(&mesh))?;
     replace(&text, |out| writeln!(out, "{}", describe(&land, form, broken, trial))).with_context(|| written(&text))?;
     let mut files = vec![land, text, mesh];
     if let Some(drawn) = eye.and_then(|eye| eye.picture(&field, form, &broken.view.1)) {
@@ -61,7 +62,8 @@ pub fn counter_example(
     Ok(files)
 }
 
-fn mesh_of(field: &Arc<Field>, form: &Form, view: &View) -> Vec<crate::height::surface::Triangle> {
+/// The triangles of a form in a view, and how many fraction bits their corners have.
+fn mesh_of(field: &Arc<Field>, form: &Form, view: &View) -> (Vec<Triangle>, u32) {
     let mut technique = (form.entry.build)(Arc::clone(field), &form.settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
@@ -70,7 +72,7 @@ fn mesh_of(field: &Arc<Field>, form: &Form, view: &View) -> Vec<crate::height::s
         expand::triangles(field, &frame, technique.resident(), &list),
         expand::skirts(field, &frame, technique.resident(), &list),
     );
-    surface.iter().chain(&skirts).map(|drawn| drawn.corners).collect()
+    (surface.iter().chain(&skirts).map(|drawn| drawn.corners).collect(), list.fraction_bits)
 }
 
 /// What failed, and the commands that show it.

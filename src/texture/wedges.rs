@@ -9,7 +9,7 @@ use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
-use crate::height::surface::{Triangle, doubled_area};
+use crate::height::surface::{self, Triangle, doubled_area};
 use crate::view::{Lens, View};
 
 /// Pixels between the samples at which what is hidden is looked for.
@@ -34,19 +34,19 @@ pub fn root_side(field: &Field) -> u32 {
 pub fn of_list(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Vec<Wedge> {
     let mut wedges = Vec::new();
     expand::visit_triangles(field, &Frame::placing(field, view), resident, list, |drawn| {
-        wedges.extend(of_triangle(field, view, &drawn.corners));
+        wedges.extend(of_triangle(field, view, &drawn.corners, list.fraction_bits));
     });
     wedges
 }
 
-fn of_triangle(field: &Field, view: &View, triangle: &Triangle) -> Option<Wedge> {
-    let side = f64::from(root_side(field));
+fn of_triangle(field: &Field, view: &View, triangle: &Triangle, fraction_bits: u32) -> Option<Wedge> {
+    let side = f64::from(root_side(field)) * f64::from(1u32 << fraction_bits);
     let level = (side * side / doubled_area(triangle) as f64).log2().round().max(0.0) as u32;
     let right_angle = (0..3).max_by_key(|&k| squared_length(triangle, k)).unwrap_or(0);
     let corners = [0, 1, 2].map(|k| {
         let corner = triangle[(k + right_angle) % 3];
         let [x, z] = [corner.x, corner.z].map(f64::from);
-        Corner { map: DVec2::new(x, z) / side, world: field.world_at(x, z, f64::from(corner.y)) }
+        Corner { map: DVec2::new(x, z) / side, world: surface::world(field, &corner, fraction_bits) }
     });
     let [a, b, c] = corners.map(|corner| corner.world);
     let to_eye = if matches!(view.lens, Lens::Perspective { .. }) { view.eye - a } else { -view.forward() };

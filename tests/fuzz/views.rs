@@ -128,9 +128,10 @@ pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::T
     if field.land().is_some() {
         return;
     }
-    let [w, h] = field.size().map(i64::from);
+    let [last_x, last_z] = field.size().map(|n| (i64::from(n) - 1) << list.fraction_bits);
     let is_inside = |corner: &cuesta::height::surface::Corner| {
-        (0..w).contains(&i64::from(corner.x)) && (0..h).contains(&i64::from(corner.z)) && corner.y.is_finite()
+        let [x, z] = [corner.x, corner.z].map(i64::from);
+        (0..=last_x).contains(&x) && (0..=last_z).contains(&z) && corner.y.is_finite()
     };
     expand::visit_triangles(field, &Frame::placing(field, view), technique.resident(), &list, |drawn| {
         assert!(drawn.corners.iter().all(is_inside), "{:?}", drawn.corners);

@@ -34,7 +34,7 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn T
 /// What the device draws of the last list is what the list says.
 fn assert_same(stage: &mut Stage, technique: &mut dyn Technique, field: &Arc<Field>, view: &View, name: &str) {
     let captured = stage.capture(technique, view).unwrap();
-    let frame = Frame::placing(field, view);
+    let frame = Frame { fraction_bits: stage.list.fraction_bits as i32, ..Frame::placing(field, view) };
     let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &stage.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
     assert_eq!(expanded[1].is_empty(), technique.manner().seams == Seams::Shared, "{name}");
@@ -68,6 +68,9 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("clusters", &["block=8", "morph=distance"]),
                 ("clusters:draw-per-block", &["block=8", "morph=distance"]),
                 ("clusters:gpu-driven", &["block=8", "morph=distance"]),
+                ("sorted-strips", &["level=uniform", "blend=height"]),
+                ("sorted-strips", &["level=uniform", "blend=end"]),
+                ("sorted-strips", &["level=uniform", "blend=end", "topology=strip"]),
             ];
             for (name, settings) in rooms {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());
@@ -111,21 +114,25 @@ fn the_devices_oracle_agrees_with_the_exact_one() {
         let land = Arc::new(synth::synth(synth::Kind::Fractal, [700, 513], 3));
         for (field, px) in [(mountains(), 1.0), (as_f32(&mountains()), 6.0), (Arc::clone(&land), 2.0), (land, 12.0)] {
             let view = aslant(&field, [640, 400], px);
-            let mut technique = technique(&field, "geomipmap", &["block=33"]);
-            let mut stage = stage(gpu, &field, technique.as_mut(), &view);
-            let there = stage.errors(technique.as_ref(), &view).unwrap();
-            let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
-            for (there, here) in there.into_iter().zip([here.vertical_m, here.screen_px]) {
-                let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
-                assert!(here.max > 0.0 && here.count > 5000, "{here:?}");
-                // Samples within rounding of the picture's border may be in or out.
-                assert!(near(there.count as f64, here.count as f64, 1e-3), "{there:?} {here:?}");
-                let ulp = f64::from((here.max as f32).next_up() - here.max as f32);
-                let ulps = (there.max - here.max).abs() / ulp;
-                println!("{ulps:.1} ulps of {}", here.max);
-                assert!(ulps <= ULPS, "{ulps} ulps: {there:?} {here:?}");
-                assert!(near(there.rms, here.rms, 1e-3), "{there:?} {here:?}");
-                assert!((here.p999 * 0.999..=here.p999 * 1.064).contains(&there.p999), "{there:?} {here:?}");
+            let rooms =
+                [("geomipmap", &["block=33"][..]), ("sorted-strips", &["level=uniform", "blend=end", "page=256"])];
+            for (name, settings) in rooms {
+                let mut technique = technique(&field, name, settings);
+                let mut stage = stage(gpu, &field, technique.as_mut(), &view);
+                let there = stage.errors(technique.as_ref(), &view).unwrap();
+                let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
+                for (there, here) in there.into_iter().zip([here.vertical_m, here.screen_px]) {
+                    let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
+                    assert!(here.max > 0.0 && here.count > 5000, "{here:?}");
+                    // Samples within rounding of the picture's border may be in or out.
+                    assert!(near(there.count as f64, here.count as f64, 1e-3), "{there:?} {here:?}");
+                    let ulp = f64::from((here.max as f32).next_up() - here.max as f32);
+                    let ulps = (there.max - here.max).abs() / ulp;
+                    println!("{ulps:.1} ulps of {}", here.max);
+                    assert!(ulps <= ULPS, "{ulps} ulps: {there:?} {here:?}");
+                    assert!(near(there.rms, here.rms, 1e-3), "{there:?} {here:?}");
+                    assert!((here.p999 * 0.999..=here.p999 * 1.064).contains(&there.p999), "{there:?} {here:?}");
+                }
             }
         }
     });

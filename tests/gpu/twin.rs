@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame, VertexNormals};
 use cuesta::draw::normals::explicit_normal;
-use cuesta::draw::place::{explicit_height, lattice_position, placed, relative_position, turned_position};
+use cuesta::draw::place::{explicit_height, explicit_position, placed, relative_position};
 use cuesta::draw::skirts::{self, is_skirted};
 use cuesta::draw::{DrawList, Instance, Manner, Morph, Seams};
 use cuesta::gpu::Gpu;
@@ -92,22 +92,21 @@ fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
     let vertex = &query.vertex;
     if query.explicit_height == 0 {
         let placed = placed(field, frame, &query.instance, vertex.position);
-        return relative_position(frame, placed.at, placed.height);
+        return relative_position(frame, placed.at.map(|n| n << frame.fraction_bits), placed.height);
     }
     let height = explicit_height(&query.instance, vertex);
-    let turned = turned_position(&query.instance, vertex.position);
-    relative_position(frame, lattice_position(frame, &query.instance, turned), height)
+    relative_position(frame, explicit_position(frame, &query.instance, vertex), height)
 }
 
 fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
-    for morph in [Morph::No, Morph::ByInstance, Morph::ByDistance] {
-        compare_morph(gpu, name, field, page_shift, morph);
+    for (morph, fraction_bits) in [(Morph::No, 0), (Morph::No, 6), (Morph::ByInstance, 0), (Morph::ByDistance, 0)] {
+        compare_morph(gpu, name, field, page_shift, morph, fraction_bits);
     }
 }
 
-fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph) {
+fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph, fraction_bits: i32) {
     let view = aslant(field, [320, 200], 2.0);
-    let frame = Frame::placing(field, &view);
+    let frame = Frame { fraction_bits, ..Frame::placing(field, &view) };
     let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_manner(Manner {
         morph,
         seams: Seams::Skirts,

@@ -38,7 +38,7 @@ fn heights(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> 
     let [w, h] = field.size();
     let mut heights = vec![f64::NAN; (w * h) as usize];
     expand::visit_triangles(field, &Frame::placing(field, view), resident, list, |drawn| {
-        surface::visit_samples(&drawn.corners, |x, z, y| {
+        surface::visit_samples_between(&drawn.corners, list.fraction_bits, |x, z, y| {
             let height = &mut heights[(z * w + x) as usize];
             *height = height.max(y);
         });

@@ -3,6 +3,7 @@
 use cuesta::draw::expand::Drawn;
 use cuesta::height::surface::Corner;
 use cuesta::height::{Field, Holes, Samples};
+use cuesta::lod::sorted_strips::blend::Blend;
 use cuesta::lod::sorted_strips::pages::{Gaze, Grid, Pages};
 use cuesta::lod::sorted_strips::shapes::Shapes;
 use cuesta::lod::sorted_strips::splits::{Levels, Splits};
@@ -78,7 +79,7 @@ impl Scene {
             levels: &self.splits,
             shapes: &shapes,
             gaze: self.gaze,
-            blends: false,
+            blend: Blend::Off,
         };
         let streams = self.pages.rows(&self.gaze).into_iter().map(|row| ground.walk(&row));
         streams
@@ -250,8 +251,65 @@ fn blending_leaves_no_jumps() {
     let field = std::sync::Arc::new(field);
     for page in ["page=16", "page=64"] {
         let of = |blend: &str| changes(&blended_heights(&field, &["level=uniform", "edge=20", page, blend], 400));
-        let ([jump, _], [step, way]) = (of("blend=off"), of("blend=height"));
-        println!("{page}: jumps of {jump} m, blended {step} m a step and {way} m in all");
-        assert!(jump > 1.0 && step < 0.05 * jump && way > 0.1 * jump, "{page}: {jump} {step} {way}");
+        let [jump, _] = of("blend=off");
+        for blend in ["blend=height", "blend=end"] {
+            let [step, way] = of(blend);
+            println!("{page} {blend}: jumps of {jump} m, blended {step} m a step and {way} m in all");
+            assert!(jump > 1.0 && step < 0.05 * jump && way > 0.1 * jump, "{page} {blend}: {jump} {step} {way}");
+        }
     }
+}
+
+/// Vertices that slide are on the edge of the next level on which they lie, and its ends stand.
+#[test]
+fn what_slides_does_so_along_an_edge_between_vertices_that_stand() {
+    let mut field = cuesta::height::synth::synth(cuesta::height::synth::Kind::Fractal, [257, 200], 5);
+    field.spacing = [20.0, 30.0];
+    let field = std::sync::Arc::new(field);
+    let [w, h] = field.size().map(|n| f64::from(n - 1));
+    let mut dice = Dice(7);
+    let (mut sliding, mut arrived) = (0, 0);
+    for edge in ["edge=4", "edge=20", "edge=300", "edge=2000"] {
+        let mut strips = super::technique(&field, "sorted-strips", &["level=uniform", "blend=end", edge]);
+        for _ in 0..30 {
+            let at = [w, h].map(|n| n * (1.4 * dice.share() - 0.2));
+            let view = View {
+                eye: field.world_at(at[0], at[1], f64::from(field.statistics().max) + 1000.0 * dice.share()),
+                world_from_eye: View::turned(360.0 * dice.share(), -60.0 * dice.share(), 0.0),
+                lens: Lens::Perspective { fov_x: 1.5 },
+                size: [640, 400],
+                ..nothing()
+            };
+            let mut list = cuesta::draw::DrawList::default();
+            strips.select(&view, &mut list);
+            watertight::prove_list(&field, &view, strips.manner().seams, strips.resident(), &list)
+                .unwrap_or_else(|why| panic!("{edge} {view:?}: {why}"));
+            let unit = 1 << list.fraction_bits;
+            let at = |v: &cuesta::draw::ExplicitVertex| v.position.map(|n| f64::from(n) / f64::from(unit));
+            let stands = |v: &&cuesta::draw::ExplicitVertex| v.morph == 0.0;
+            let still: std::collections::HashSet<_> =
+                list.streamed.vertices.iter().filter(stands).map(|v| v.position).collect();
+            for vertex in list.streamed.vertices.iter().filter(|v| v.morph > 0.0) {
+                let [x, z] = at(vertex);
+                sliding += 1;
+                arrived += usize::from(vertex.morph > 0.98);
+                // Back from the weight to where it stands, for each level that it may be of: one fits.
+                let fits = (0..6).any(|level| {
+                    let step = f64::from(1 << level);
+                    [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]].iter().any(|way| {
+                        let home = [0, 1].map(|k| [x, z][k] + way[k] * step * f64::from(vertex.morph));
+                        let end = [0, 1].map(|k| ((home[k] - way[k] * step) * f64::from(unit)) as i32);
+                        home.iter().all(|n| n.fract() == 0.0)
+                            && still.contains(&end)
+                            && home.iter().all(|n| *n >= 0.0)
+                            && vertex.height == field.height(home[0] as u32, home[1] as u32)
+                            && vertex.target == field.height((end[0] / unit) as u32, (end[1] / unit) as u32)
+                    })
+                });
+                assert!(fits, "{edge}: {vertex:?}");
+            }
+        }
+    }
+    println!("{sliding} vertices slide, {arrived} have all but arrived");
+    assert!(sliding > 10_000 && arrived > 100);
 }

@@ -51,7 +51,7 @@ impl Scene {
         let touches = found.triangles.iter().any(|t| t.iter().any(|c| [c.x, c.z] == at));
         assert!(touches, "planted at {at:?}, found {found}");
         let mut ply = Vec::new();
-        watertight::write_ply(&self.field, &found.triangles, &mut ply).expect("memory takes anything");
+        watertight::write_ply(&self.field, &found.triangles, 0, &mut ply).expect("memory takes anything");
         let ply = String::from_utf8(ply).expect("text");
         assert!(ply.contains(&format!("element face {}\n", found.triangles.len())), "{ply}");
         let picture = plan::picture(triangles, &found);

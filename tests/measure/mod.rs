@@ -1,6 +1,7 @@
 //! Measurements on lists of real techniques.
 
 mod angles;
+mod between;
 mod faults;
 mod journeys;
 mod peers;

@@ -1,22 +1,66 @@
-//! Vertices, and how they go over into the next level: towards the middle of the edge of that level on which they lie, as
-//! that edge is drawn (Finch & Bishop, §4.9).
+//! Vertices, and how they go over into the next level: a vertex is in the middle of an edge of that level, and either rises
+//! or falls to where that edge is drawn, or slides along it into one of its ends (Finch & Bishop, §4.9).
 //!
-//! Heights only: the paper's variant in three dimensions, in which a vertex slides out of an end of that edge, has vertices
-//! between samples, which the neck has not: its lattice is what all proofs of a surface stand on.
+//! What slides has places between samples. Its way has as many steps as a sample has parts, so that each of its places lies
+//! on the lattice of these parts and on the edge, to the bit. An edge's ends stand while something slides between them: the
+//! table's levels are far enough apart for it ([`Radial`](super::table::Radial)). So no triangle turns over: what slides
+//! does so on a side of a triangle of the next level, and that triangle stands. The last of the steps is that in which it
+//! goes: a vertex in the end of its edge would leave triangles without area beside others that have not arrived yet.
 
+use super::pages::Grid;
 use super::splits::Levels;
 use super::walk::Ground;
 use crate::draw::ExplicitVertex;
 use crate::draw::place::morphed_height;
 
+/// Bits that the sides of a page and of a field may have in parts of samples: areas of triangles fit 32 bits, and positions
+/// are proven ([`watertight`](crate::measure::watertight)).
+const BITS: [u32; 2] = [14, 24];
+
+/// How vertices go over into the next level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Blend {
+    /// They are there at once.
+    #[default]
+    Off,
+    /// Their heights go to that of the edge of the next level on which they lie.
+    Height,
+    /// They go to an end of that edge, in all three dimensions, by so many bits of parts of a sample.
+    End(u32),
+}
+
+impl Blend {
+    /// What the setting may be.
+    pub const WORDS: &[&str] = &["off", "height", "end"];
+
+    /// What a word of the setting says over a field in pages: the smaller they are, the finer the parts.
+    pub fn of(word: &str, grid: &Grid) -> Self {
+        match word {
+            "height" => Blend::Height,
+            "end" => {
+                let field = 32 - grid.last[0].max(grid.last[1]).leading_zeros();
+                Blend::End(BITS[0].saturating_sub(grid.level).min(BITS[1].saturating_sub(field)))
+            }
+            _ => Blend::Off,
+        }
+    }
+
+    /// Bits of positions that are parts of a sample.
+    pub fn fraction_bits(self) -> u32 {
+        if let Blend::End(bits) = self { bits } else { 0 }
+    }
+}
+
 impl<L: Levels> Ground<'_, L> {
-    /// The vertex at a position: the same wherever it is asked for.
+    /// The vertex that is at a position when it stands: the same wherever it is asked for.
     pub(super) fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
         let [x, z] = position;
-        let height = self.field.height(x as u32, z as u32);
-        let still = ExplicitVertex { position, height, target: height, ..ExplicitVertex::default() };
+        let height = self.height(position);
+        let bits = self.blend.fraction_bits();
+        let still =
+            ExplicitVertex { position: [x << bits, z << bits], height, target: height, ..ExplicitVertex::default() };
         let level = (x | z).trailing_zeros();
-        if !self.blends || level >= self.pages.grid.level {
+        if self.blend == Blend::Off || level >= self.pages.grid.level {
             return still;
         }
         let morph = self.levels.weight(level, position);
@@ -29,8 +73,22 @@ impl<L: Levels> Ground<'_, L> {
         if morph == 0.0 || !is_inside {
             return still;
         }
+        if matches!(self.blend, Blend::End(_)) {
+            let parts = 1 << bits;
+            let steps = ((morph * parts as f32).round() as i32).min(parts - 1);
+            return ExplicitVertex {
+                position: [0, 1].map(|k| still.position[k] - apart[k] * steps),
+                target: self.height(ends[0]),
+                morph: steps as f32 / parts as f32,
+                ..still
+            };
+        }
         let [a, b] = ends.map(|end| self.vertex(end)).map(|v| morphed_height(v.height, v.target, v.morph));
         ExplicitVertex { target: (a + b) * 0.5, morph, ..still }
+    }
+
+    fn height(&self, [x, z]: [i32; 2]) -> f32 {
+        self.field.height(x as u32, z as u32)
     }
 }
 

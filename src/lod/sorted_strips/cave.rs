@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::blend::Blend;
 use super::certified::{Certified, bounds, guarded};
 use super::footprint::Footprint;
 use super::measure::Errors;
@@ -142,7 +143,7 @@ impl CaveStrips {
     fn walk(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> bool {
         let (field, sight) = (&**self.cave.floor(), Sight::new(self.cave.floor(), view));
         let (pages, levels, shapes) = (&self.pages, &self.splits, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: false };
+        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blend: Blend::Off };
         rows.par_iter().zip(&mut self.rows).for_each(|(row, RowWorker { worker, pairs })| {
             worker.stream.clear();
             ground.walk_on(row, worker);

@@ -17,8 +17,7 @@
 //!   without a depth buffer, and the picture is the same to the pixel;
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
 //!   row and column of pages, where some rays go against the walk ([`order`]);
-//! - blending moves heights only, and only with `level=uniform`: the neck has no vertices between samples, which the
-//!   paper's variant in three dimensions needs, and a bound would be spent on it;
+//! - vertices go over into the next level only with `level=uniform`: a bound would be spent on it;
 //! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
 //!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
 //!   3.0 px and the 99.9th percentile from 26 px to 1.05 px, for a quarter more triangles (282 k to 351 k); a band
@@ -52,6 +51,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
+use self::blend::Blend;
 use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
@@ -127,9 +127,9 @@ pub const ENTRY: Entry = Entry {
         },
         Setting {
             key: "blend",
-            values: Values::Words(&["off", "height"]),
+            values: Values::Words(Blend::WORDS),
             default: "off",
-            about: "whether vertices of level=uniform go over into the next level, or are there at once",
+            about: "how vertices of level=uniform go over into the next level: at once, up or down, or into an end of its edge",
         },
     ],
     most_samples: u64::MAX,
@@ -152,7 +152,7 @@ struct SortedStrips {
     edge: Option<f64>,
     /// Width of the band around the picture that is as fine as the picture, pictures.
     guard: f64,
-    blends: bool,
+    blend: Blend,
     sequence: Sequence,
     topology: Topology,
     /// The most parts of a frame, and one of them.
@@ -201,7 +201,7 @@ impl SortedStrips {
             workers: Vec::new(),
             edge: (!level_is_certified).then(|| settings.number("edge")),
             guard: settings.number("guard"),
-            blends: settings.word("blend") == "height" && !level_is_certified,
+            blend: if level_is_certified { Blend::Off } else { Blend::of(settings.word("blend"), &grid) },
             sequence,
             topology,
             parts,
@@ -234,7 +234,7 @@ impl SortedStrips {
     /// how many vertices and indices each has. `None` if they would not fit the limits.
     fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<[usize; 2]>> {
         let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blends: self.blends };
+        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blend: self.blend };
         let has_room =
             |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.most_indices;
         if let [worker] = workers {
@@ -265,8 +265,8 @@ impl SortedStrips {
             worker.stream.clear();
         }
         if let Some(edge) = self.edge {
-            let levels = Radial::uniform(&self.field, view, edge * view.tolerance.px, self.pages.grid.level);
-            let levels = if self.blends { levels.blending(self.pages.grid.level) } else { levels };
+            let edge_px = edge * view.tolerance.px;
+            let levels = Radial::uniform(&self.field, view, edge_px, self.pages.grid.level, self.blend);
             return self.walk(&levels, gaze, rows, workers);
         }
         if self.split(view) { self.walk(&self.splits, gaze, rows, workers) } else { None }
@@ -329,6 +329,7 @@ impl SortedStrips {
             list.draws.push(Draw { source, topology, indices, instances, first_vertex });
             first_vertex += vertices;
         }
+        list.fraction_bits = self.blend.fraction_bits();
         self.sequence.arrange(list);
         topology::arrange(self.topology, list);
     }

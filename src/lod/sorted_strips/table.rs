@@ -5,6 +5,7 @@
 //! with distance in plan from the eye to the nearest point of a square, and the eye's height above the land under it as
 //! the third side. Any table may be given. Whether it keeps the Lipschitz condition is checked, never assumed.
 
+use super::blend::Blend;
 use super::splits::Levels;
 use crate::height::Field;
 use crate::view::{Lens, View};
@@ -160,8 +161,8 @@ pub struct Radial {
 
 impl Radial {
     /// Triangles whose short sides are about `edge_px` pixels long on the screen, up to level `most`; the table is
-    /// repaired if it must be.
-    pub fn uniform(field: &Field, view: &View, edge_px: f64, most: u32) -> Self {
+    /// repaired if it must be. Vertices of levels below `most` go over into the next level as `blend` says.
+    pub fn uniform(field: &Field, view: &View, edge_px: f64, most: u32, blend: Blend) -> Self {
         let [dx, dz] = field.spacing;
         let sample_px = view.focal_px() * dx.max(dz);
         let steps = match view.lens {
@@ -174,7 +175,12 @@ impl Radial {
                 Steps::of(&Table::new(vec![level], 0.0), most)
             }
         };
-        Self::of(field, view, &steps.repaired(dx.hypot(dz)))
+        // A vertex that slides is in a square of the next level, as are the ends between which it does. That square begins
+        // before the next level does, so the ends are at most its diagonal further away, and the half of the next level in
+        // which they stand is as deep.
+        let diagonals = if matches!(blend, Blend::End(_)) { 2.0 } else { 1.0 };
+        let radial = Self::of(field, view, &steps.repaired(diagonals * dx.hypot(dz)));
+        if blend == Blend::Off { radial } else { radial.blending(most) }
     }
 
     /// A table up to level `most` that keeps its condition, seen from the view's eye.
@@ -197,8 +203,7 @@ impl Radial {
         }
     }
 
-    /// Vertices of levels below `most` go over into the next level (Finch & Bishop, §4.9).
-    pub fn blending(mut self, most: u32) -> Self {
+    fn blending(mut self, most: u32) -> Self {
         let distance_m = |begin: &f64| if *begin > 0.0 { (begin / self.scale).sqrt() } else { 0.0 };
         self.begins_m = self.begins[..=most as usize].iter().map(distance_m).collect();
         self

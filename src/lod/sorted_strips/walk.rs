@@ -25,6 +25,7 @@
 //! Rows of pages are walked independently: the front edge of the row behind follows from the level function, and its
 //! vertices are made again, as the paper copies them from page to page.
 
+use super::blend::Blend;
 use super::order::{Crossing, Order};
 use super::pages::{Gaze, Pages, Row, Run, placed};
 use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
@@ -76,8 +77,8 @@ pub struct Ground<'a, L> {
     pub shapes: &'a Shapes,
     /// Where the eye is and looks.
     pub gaze: Gaze,
-    /// Whether vertices go over into the next level.
-    pub blends: bool,
+    /// How vertices go over into the next level.
+    pub blend: Blend,
 }
 
 /// A vertex that is used but not made yet.
@@ -147,8 +148,8 @@ struct Walk<'a, L> {
     has_beside: bool,
     /// Whether (u, v) turns the other way than (x, z).
     mirrored: bool,
-    /// Whether the run sticks out of the field.
-    sticks_out: bool,
+    /// Whether vertices may lie elsewhere than in their shape: the run sticks out of the field, or they slide.
+    is_moved: bool,
 }
 
 impl<L: Levels> Ground<'_, L> {
@@ -178,7 +179,7 @@ impl<L: Levels> Ground<'_, L> {
             has_behind: false,
             has_beside: false,
             mirrored: false,
-            sticks_out: false,
+            is_moved: false,
         };
         // Each run fills its own part of the marks.
         walk.marks.resize((longest as usize + 1).max(walk.marks.len()), Mark { v: UNUSED, vertex: UNMADE });
@@ -208,10 +209,11 @@ impl<L: Levels> Walk<'_, L> {
         // Positions grow with (u, v) or with (v, u).
         self.mirrored = (self.signs[0] * self.signs[1] > 0) == (major == 0);
         self.has_beside = pages.is_drawn(page(row.row, run.first - run.sign));
-        self.sticks_out = (0..2).any(|k| {
+        let sticks_out = (0..2).any(|k| {
             let end = if k == major { row.row } else { run.first.max(run.first + run.sign * (run.pages - 1)) } + 1;
             end * pages.grid.side() > pages.grid.last[k]
         });
+        self.is_moved = sticks_out || matches!(self.ground.blend, Blend::End(_));
         self.marks[..=self.length as usize].fill(Mark { v: UNUSED, vertex: UNMADE });
         for n in 0..run.pages {
             if row.has_behind && pages.is_drawn(page(row.row - row.sign, run.first + n * run.sign)) {
@@ -348,8 +350,8 @@ impl<L: Levels> Walk<'_, L> {
             let first = self.stream.indices.len();
             self.order.begin(&self.crossing, page, (level, [column, row]), is_pair, first);
         }
-        if self.sticks_out {
-            return self.push_collapsed(shape, slots, [u, v], size, eye);
+        if self.is_moved {
+            return self.push_moved(shape, slots, [u, v], size, eye);
         }
         let (mirrored, indices) = (self.mirrored, &mut self.stream.indices);
         shape.visit_in_order(shape.places, eye, |[a, b, c]| {
@@ -359,18 +361,19 @@ impl<L: Levels> Walk<'_, L> {
 
     /// The same where vertices may lie elsewhere than in their shape: triangles without area are left out.
     #[cold]
-    fn push_collapsed(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
-        let (major, last) = (self.ground.gaze.major, self.ground.pages.grid.last);
-        let collapsed = |k: usize, first: i32, halves: f64| {
-            let along = f64::from(first) + halves * f64::from(size) / 2.0;
-            let position = f64::from(self.origin[k]) + f64::from(self.signs[k]) * along;
-            let position = position.min(f64::from(last[if k == 0 { 1 - major } else { major }]));
-            ((position - f64::from(self.origin[k])) * f64::from(self.signs[k]) - f64::from(first)) * 2.0
-                / f64::from(size)
-        };
-        let places = shape.places.map(|[along, forward]| [collapsed(0, u, along), collapsed(1, v, forward)]);
+    fn push_moved(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
+        let (major, unit) = (self.ground.gaze.major, f64::from(1 << self.ground.blend.fraction_bits()));
         let (mirrored, Stream { vertices, indices }) = (self.mirrored, &mut self.stream);
         let vertices = &vertices[self.first_vertex..];
+        let place = |vertex: &ExplicitVertex| {
+            let along = |k: usize, position: i32, first: i32| {
+                let along = (f64::from(position) / unit - f64::from(self.origin[k])) * f64::from(self.signs[k]);
+                (along - f64::from(first)) * 2.0 / f64::from(size)
+            };
+            [along(0, vertex.position[1 - major], u), along(1, vertex.position[major], v)]
+        };
+        // Slots that the shape has not are none of a vertex.
+        let places = slots.map(|slot| vertices.get(slot as usize).map_or([0.0; 2], place));
         shape.visit_in_order(&places, eye, |[a, b, c]| {
             let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|slot| slots[slot]);
             if has_area(vertices, triangle) {

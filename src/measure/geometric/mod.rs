@@ -56,7 +56,7 @@ pub struct Errors {
 /// Measures the triangles of a list; in a cave those that face down against its ceiling. Time is linear in triangles and samples; memory is bounded by a
 /// few thousandths of the field's samples for each of 64 pieces of work.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
-    let ruler = Ruler::new(field, view);
+    let ruler = Ruler::new(field, view, list.fraction_bits);
     let mut total = ruler.tallies();
     each_part(list, |part| ruler.part(resident, list, part), |part| total.merge(part));
     total.errors(view.tolerance.px)
@@ -102,6 +102,7 @@ struct Ruler<'a> {
     /// What those that face down are, in a cave.
     ceiling: Option<Truth<'a>>,
     tolerance_px: f64,
+    fraction_bits: u32,
     frame: Frame,
     frustum: Frustum,
     projection: Projection,
@@ -122,9 +123,10 @@ impl<'a> Truth<'a> {
 }
 
 impl<'a> Ruler<'a> {
-    fn new(field: &'a Field, view: &View) -> Self {
+    fn new(field: &'a Field, view: &View, fraction_bits: u32) -> Self {
         Self {
             field,
+            fraction_bits,
             floor: Truth::new(field, view),
             ceiling: field.ceiling().map(|ceiling| Truth::new(ceiling, view)),
             tolerance_px: view.tolerance.px,
@@ -158,13 +160,14 @@ impl<'a> Ruler<'a> {
     }
 
     fn triangle(&self, truth: &Truth, triangle: &Triangle, tallies: &mut Tallies) {
-        if self.frustum.contains(&bounds(self.field, triangle)) == Containment::Outside {
+        let bits = self.fraction_bits;
+        if self.frustum.contains(&bounds(self.field, triangle, bits)) == Containment::Outside {
             return;
         }
         let last = self.field.size().map(|n| n as i32 - 1);
-        surface::visit_samples(triangle, |x, z, y| {
+        surface::visit_samples_between(triangle, bits, |x, z, y| {
             let error = y - f64::from(truth.field.height(x, z));
-            let counts = owns(triangle, [x as i32, z as i32], last);
+            let counts = owns(triangle, bits, [x as i32, z as i32], last);
             if (error == 0.0 && !counts) || self.field.is_hole(x, z) {
                 return;
             }
@@ -194,17 +197,18 @@ impl<'a> Ruler<'a> {
 }
 
 /// The box around a triangle, world metres.
-fn bounds(field: &Field, triangle: &Triangle) -> Aabb {
-    let [a, b, c] = triangle.map(|corner| field.world_at(corner.x.into(), corner.z.into(), corner.y.into()));
+fn bounds(field: &Field, triangle: &Triangle, fraction_bits: u32) -> Aabb {
+    let [a, b, c] = triangle.each_ref().map(|corner| surface::world(field, corner, fraction_bits));
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
 }
 
 /// Whether the triangle is the one that counts a sample inside it or on its border: the one that holds the
-/// sample moved by (ε, ε²) for an infinitely small ε, towards the inside of the field.
-pub(super) fn owns(triangle: &Triangle, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
+/// sample moved by (ε, ε²) for an infinitely small ε, towards the inside of the field. The triangle's corners have so many
+/// fraction bits.
+pub(super) fn owns(triangle: &Triangle, fraction_bits: u32, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
     let towards = [if x < last[0] { 1 } else { -1 }, if z < last[1] { 1 } else { -1 }];
     let [a, b, c] = *triangle;
-    let sample = Corner { x, z, y: 0.0 };
+    let sample = Corner { x: x << fraction_bits, z: z << fraction_bits, y: 0.0 };
     [[sample, b, c], [sample, c, a], [sample, a, b]].iter().all(|side| {
         let [_, p, q] = *side;
         // Growth of the side's doubled area with x and with z.

@@ -67,7 +67,7 @@ fn in_plan(triangle: &Drawn) -> [u64; 3] {
 
 /// The border of what is one surface.
 fn one_surface(field: &Field, triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
-    on_the_field(field, triangles)?;
+    on_the_field(field, triangles, 0)?;
     faces_up(triangles)?;
     one_height_a_vertex(triangles)?;
     let border = edges::border(triangles, |_, _| true)?;

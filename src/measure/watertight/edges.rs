@@ -1,6 +1,6 @@
 //! Edges of triangles: which are shared, which make the border, and whether the border is clean.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -111,6 +111,37 @@ pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), B
         }
     }
     Ok(())
+}
+
+/// A border whose edges' ends have so many fraction bits, in samples: edges that follow each other in one direction are
+/// one. Refuted if a line of it does not go from sample to sample.
+pub fn between_samples(
+    triangles: &[Drawn],
+    border: Vec<BorderEdge>,
+    fraction_bits: u32,
+) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
+    let direction = |edge: &BorderEdge| {
+        let along = [0, 1].map(|k| edge.to[k] - edge.from[k]);
+        along.map(|n| n / gcd(along[0].unsigned_abs(), along[1].unsigned_abs()) as i32)
+    };
+    // Two edges may leave one place, in two directions: where two parts of the border touch.
+    let next: HashMap<_, _> = border.iter().map(|edge| ((edge.from, direction(edge)), edge)).collect();
+    let entered: HashSet<_> = border.iter().map(|edge| (edge.to, direction(edge))).collect();
+    let starts = border.iter().filter(|edge| !entered.contains(&(edge.from, direction(edge))));
+    let whole_line = |first: &BorderEdge| {
+        let mut line = *first;
+        while let Some(edge) = next.get(&(line.to, direction(first))) {
+            line.to = edge.to;
+        }
+        let mask = (1 << fraction_bits) - 1;
+        if line.from.iter().chain(&line.to).any(|n| n & mask != 0) {
+            let text = format!("border {:?} {:?} does not go from sample to sample", line.from, line.to);
+            return refuted(Kind::Gap, triangles, [line.triangle], text);
+        }
+        let [from, to] = [line.from, line.to].map(|at| at.map(|n| n >> fraction_bits));
+        Ok(BorderEdge { from, to, ..line })
+    };
+    starts.map(whole_line).collect()
 }
 
 pub fn gcd(a: u32, b: u32) -> u32 {

@@ -35,7 +35,7 @@ use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, Geometry, Seams};
 use crate::height::Field;
-use crate::height::surface::{Corner, Triangle, doubled_area};
+use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::view::{Frustum, View};
 
 /// What is wrong with a surface.
@@ -62,7 +62,7 @@ pub enum Kind {
 pub struct CounterExample {
     /// What is wrong.
     pub kind: Kind,
-    /// The triangles at fault; for a gap the one that is missing.
+    /// The triangles at fault, as they were given; for a gap the samples' one that is missing.
     pub triangles: Vec<Triangle>,
     /// What is wrong with them, and where.
     pub text: String,
@@ -96,15 +96,33 @@ pub struct Proof {
 /// # Panics
 /// If the field has more than 2^24 samples a side, or there are more than 2^31 triangles.
 pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Proof, Box<CounterExample>> {
-    assert!(field.size().iter().all(|&n| n <= 1 << 24) && triangles.len() <= 1 << 31);
-    on_the_field(field, triangles)?;
+    prove_between(field, frustum, triangles, 0)
+}
+
+/// The same of triangles whose corners have so many fraction bits. Their border must consist of straight lines between
+/// samples, wherever on those lines its vertices lie.
+///
+/// # Panics
+/// If there are more than 2^31 triangles, or more than 2^24 parts of samples a side.
+pub fn prove_between(
+    field: &Field,
+    frustum: &Frustum,
+    triangles: &[Drawn],
+    fraction_bits: u32,
+) -> Result<Proof, Box<CounterExample>> {
+    assert!(field.size().iter().all(|&n| n <= 1 << (24 - fraction_bits)) && triangles.len() <= 1 << 31);
+    on_the_field(field, triangles, fraction_bits)?;
     faces_up(triangles)?;
     one_height_a_vertex(triangles)?;
-    let border = edges::border(triangles, |_, _| true)?;
+    let mut border = edges::border(triangles, |_, _| true)?;
     edges::no_t_junction(triangles, &border)?;
+    if fraction_bits > 0 {
+        border = edges::between_samples(triangles, border, fraction_bits)?;
+    }
     let strips = sweep::strips(triangles, &border)?;
     sweep::no_gap(field, frustum, &strips)?;
-    let doubled_area = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
+    let doubled_area: i64 = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
+    let doubled_area = doubled_area >> (2 * fraction_bits);
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
 }
 
@@ -120,7 +138,7 @@ pub fn prove_with_skirts(
     skirts: &[Drawn],
 ) -> Result<Proof, Box<CounterExample>> {
     assert!(field.size().iter().all(|&n| n <= 1 << 24) && triangles.len() <= 1 << 31);
-    on_the_field(field, triangles)?;
+    on_the_field(field, triangles, 0)?;
     faces_up(triangles)?;
     let border = seams::border(field, triangles, skirts)?;
     let strips = sweep::strips(triangles, &border)?;
@@ -148,7 +166,7 @@ pub fn prove_list(
         return Ok(Proof { triangles: 2 * pairs, doubled_area, border_edges: seam_edges + open_edges });
     }
     match seams {
-        Seams::Shared => prove(field, &frustum, &triangles),
+        Seams::Shared => prove_between(field, &frustum, &triangles, list.fraction_bits),
         Seams::Skirts => {
             let skirts = expand::skirts(field, &frame, resident, list);
             prove_with_skirts(field, &frustum, &triangles, &skirts)
@@ -169,9 +187,10 @@ fn refuted<T>(
     Err(Box::new(CounterExample { kind, triangles: guilty.iter().map(|t| t.corners).collect(), text }))
 }
 
-fn on_the_field(field: &Field, triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
+fn on_the_field(field: &Field, triangles: &[Drawn], fraction_bits: u32) -> Result<(), Box<CounterExample>> {
     let [w, h] = field.size().map(|n| n as i32);
-    let outside = |c: &Corner| !(0..w).contains(&c.x) || !(0..h).contains(&c.z);
+    let [last_x, last_z] = [w, h].map(|n| (n - 1) << fraction_bits);
+    let outside = |c: &Corner| !(0..=last_x).contains(&c.x) || !(0..=last_z).contains(&c.z);
     match triangles.iter().position(|t| t.corners.iter().any(outside)) {
         Some(k) => refuted(Kind::Outside, triangles, [k as u32], format!("a corner outside {w} × {h} samples")),
         None => Ok(()),
@@ -201,14 +220,14 @@ fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
     refuted(Kind::Crack, triangles, [a as u32, b as u32], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
 }
 
-/// Writes triangles as ASCII PLY, world metres.
-pub fn write_ply(field: &Field, triangles: &[Triangle], mut out: impl Write) -> io::Result<()> {
+/// Writes triangles, whose corners have so many fraction bits, as ASCII PLY, world metres.
+pub fn write_ply(field: &Field, triangles: &[Triangle], fraction_bits: u32, mut out: impl Write) -> io::Result<()> {
     writeln!(out, "ply\nformat ascii 1.0\ncomment metres: x east, y up, z south")?;
     writeln!(out, "element vertex {}", 3 * triangles.len())?;
     writeln!(out, "property double x\nproperty double y\nproperty double z")?;
     writeln!(out, "element face {}\nproperty list uchar uint vertex_indices\nend_header", triangles.len())?;
     for corner in triangles.iter().flatten() {
-        let p = field.world_at(corner.x.into(), corner.z.into(), corner.y.into());
+        let p = surface::world(field, corner, fraction_bits);
         writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
     }
     (0..triangles.len()).try_for_each(|k| writeln!(out, "3 {} {} {}", 3 * k, 3 * k + 1, 3 * k + 2))

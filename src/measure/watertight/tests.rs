@@ -131,7 +131,7 @@ fn corners_outside_are_found() {
 fn ply_has_the_triangles() {
     let field = field(&[]);
     let mut text = Vec::new();
-    write_ply(&field, &[samples_surface(&field)[3].corners], &mut text).unwrap();
+    write_ply(&field, &[samples_surface(&field)[3].corners], 0, &mut text).unwrap();
     let text = String::from_utf8(text).unwrap();
     assert!(text.contains("element vertex 3\n") && text.ends_with("\n3 0 1 2\n"), "{text}");
 }
