@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cuesta::bench::paths;
 use cuesta::draw::expand::{self, Drawn};
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, Geometry};
+use cuesta::draw::{DrawList, Geometry, Hiding};
 use cuesta::height::{Field, surface, synth};
 use cuesta::lod::Technique;
 use cuesta::measure::watertight;
@@ -203,6 +203,10 @@ fn where_vertices_slide_few_rays_meet_triangles_out_of_order() {
     println!("{still:?} {sliding:?}");
     assert_eq!((still.unsorted, still.wrong), (0, 0));
     assert!(sliding.several > 500 && sliding.wrong > 0 && 50 * sliding.wrong < sliding.land, "{sliding:?}");
+    // So a painter would not do.
+    let hiding =
+        |blend: &str| technique(&field, "sorted-strips", &["level=uniform", "order=painter", blend]).manner().hiding;
+    assert_eq!(["blend=height", "blend=end"].map(hiding), [Hiding::ByOrder, Hiding::ByDepth]);
 }
 
 /// The list as it is, and turned round: the same triangles, the last one first.

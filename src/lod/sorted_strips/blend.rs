@@ -6,6 +6,19 @@
 //! table's levels are far enough apart for it ([`Radial`](super::table::Radial)). So no triangle turns over: what slides
 //! does so on a side of a triangle of the next level, and that triangle stands. The last of the steps is that in which it
 //! goes: a vertex in the end of its edge would leave triangles without area beside others that have not arrived yet.
+//!
+//! Lines between quads go along with what slides on them, while the walk knows quads by where they stand: some rays meet
+//! triangles out of order (9 of 50,656 in the room's tests, 3 pixels of a painter's would be wrong), so `order=painter` keeps
+//! the depth buffer then.
+//!
+//! What it is worth: jumps from frame to frame on the path `fly` over the demo, 640 × 360 pixels, `edge=10`, 120 frames, and
+//! the time of selection:
+//!
+//! | `blend` | 99th percentile | 99.9th | largest | selection |
+//! |---|---|---|---|---|
+//! | `off` | 0.98 px | 3.37 px | 9.5 px | 2.5 ms |
+//! | `height` | 0.34 px | 0.68 px | 2.3 px | 3.9 ms |
+//! | `end` | 0.41 px | 0.85 px | 3.5 px | 5.4 ms |
 
 use super::pages::Grid;
 use super::splits::Levels;

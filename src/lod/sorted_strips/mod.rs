@@ -63,7 +63,7 @@ use self::splits::{Levels, Splits};
 use self::table::Radial;
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
-use crate::draw::{Draw, DrawList, Draws, Geometry, Instance, Limits, Manner, Source, Topology};
+use crate::draw::{Draw, DrawList, Draws, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, View};
@@ -385,7 +385,10 @@ impl Technique for SortedStrips {
 
     fn manner(&self) -> Manner {
         let draws = Draws::explicit(self.topology);
-        Manner { draws, hiding: self.sequence.hiding(), ..Manner::default() }
+        // Where vertices slide the order is not that of every ray.
+        let is_in_order = !matches!(self.blend, Blend::End(_));
+        let hiding = if is_in_order { self.sequence.hiding() } else { Hiding::ByDepth };
+        Manner { draws, hiding, ..Manner::default() }
     }
 
     fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {

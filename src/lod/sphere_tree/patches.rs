@@ -16,6 +16,7 @@
 //! | | leaps | 719 kB, 40 ms | 699 kB, 39 ms |
 //! | 10⁶ (251 k) | 0.05 m a frame | 6.8 MB, 23 ms | 86 kB, 1.0 ms |
 //! | | 5 m a frame | 5.9 MB, 22 ms | 2.8 MB, 13 ms |
+//! | | leaps | 4.7 MB, 358 ms | 4.7 MB, 357 ms |
 //!
 //! Where nearly all blocks change (tens of metres a frame) what is copied on the device is lost: on llvmpipe 7.1 instead of
 //! 5.2 ms of device time for 17 k triangles, 35 instead of 35 for 203 k.
