@@ -117,19 +117,17 @@ vec3 tint(float height, vec3 normal) {
     return mix(vec3(0.25, 0.22, 0.20), colour, smoothstep(0.45, 0.75, normal.y));
 }
 
-// Limestone in layers.
+// Limestone in some ten layers from the lowest to the highest sample.
 vec3 rock(float height) {
-    float layer = 0.5 + 0.5 * sin(height * 1.7 + 1.3 * sin(height * 0.41));
+    float share = share_of_range(height);
+    float layer = 0.5 + 0.5 * sin(60.0 * share + 1.3 * sin(14.5 * share));
     return mix(vec3(0.34, 0.28, 0.22), vec3(0.56, 0.50, 0.42), layer);
 }
 
-// How far the lamp at the eye reaches in a cave, metres.
-const float LAMP_REACH = 25.0;
-
-// Light of that lamp, and a little from all around.
+// Light of the lamp at the eye, and a little from all around. From outside walls show their backs: they are lit as well.
 vec3 lamplight(vec3 relative, float distance, vec3 normal) {
-    float facing = max(dot(normal, -relative) / max(distance, 1e-30), 0.0);
-    float far = distance / LAMP_REACH;
+    float facing = abs(dot(normal, relative)) / max(distance, 1e-30);
+    float far = distance / max(frame.lamp_reach, 1e-30);
     vec3 around = mix(vec3(0.05, 0.045, 0.04), vec3(0.07, 0.08, 0.10), normal.y * 0.5 + 0.5);
     return vec3(1.75, 1.5, 1.15) * facing / (1.0 + far * far) + around;
 }

@@ -72,6 +72,8 @@ shared! {
         height_scale: float,
         /// Lowest and highest sample, metres: the ends of the tint.
         height_range: vec2,
+        /// How far the lamp at the eye reaches in a cave, metres.
+        lamp_reach: float,
         /// Towards the sun, unit length.
         sun: vec3,
         /// Fog: optical density per metre.

@@ -105,6 +105,7 @@ impl Look {
         let repeats = |k: usize| Repeats::new(placing.anchor[k], field.spacing[k]);
         Frame {
             height_range: range,
+            lamp_reach: lamp_reach(field, view.eye, range),
             sun: self.towards_sun().as_vec3().to_array(),
             fog_density: self.fog as f32,
             detail_first: [0, 1].map(|k| repeats(k).first),
@@ -114,6 +115,16 @@ impl Look {
             ..placing
         }
     }
+}
+
+/// How far a lamp at the eye reaches in a cave whose heights have this range, metres: about as far as the cave is high, and
+/// to the cave from outside.
+fn lamp_reach(field: &Field, eye: DVec3, range: [f32; 2]) -> f32 {
+    let [low, high] = range.map(f64::from);
+    let [east, south] = field.size().map(|n| f64::from(n) - 1.0);
+    let ends = [field.world_at(0.0, 0.0, low), field.world_at(east, south, high)];
+    let away = (ends[0] - eye).max(eye - ends[1]).max(DVec3::ZERO).length();
+    (0.7 * (high - low) + 2.0 * away) as f32
 }
 
 /// How far materials reach along an axis before they repeat, about, metres.
