@@ -160,10 +160,16 @@ impl Shape {
     /// triangles side by side the one on the eye's side of the line between them comes first.
     #[inline]
     pub fn visit_in_order(&self, places: &Places, eye: [f64; 2], mut visit: impl FnMut([usize; 3])) {
-        let mut behind = [0u8; 5];
-        for seam in &self.seams {
+        let in_order = |seam: &Seam| {
             let first_is_nearer = side(seam.line.map(|slot| places[slot]), eye) >= 0.0;
-            let (near, far) = if first_is_nearer { (seam.first, seam.second) } else { (seam.second, seam.first) };
+            if first_is_nearer { [seam.first, seam.second] } else { [seam.second, seam.first] }
+        };
+        // Most quads are plain.
+        if let [seam] = &self.seams[..] {
+            return in_order(seam).into_iter().for_each(|k| visit(self.triangles[k]));
+        }
+        let mut behind = [0u8; 5];
+        for [near, far] in self.seams.iter().map(in_order) {
             behind[far] |= 1 << near;
         }
         // The triangles and their seams form a tree: in each round one is free.
