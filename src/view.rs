@@ -25,6 +25,14 @@ impl Aabb {
         far.x.hypot(far.z)
     }
 
+    /// The least and the largest distance of its points from a place in plan (x, z).
+    fn distances_in_plan(&self, [x, z]: [f64; 2]) -> (f64, f64) {
+        let (min, max) = ([self.min.x - x, self.min.z - z], [self.max.x - x, self.max.z - z]);
+        let least = [0, 1].map(|k| min[k].max(-max[k]).max(0.0));
+        let most = [0, 1].map(|k| max[k].max(-min[k]));
+        (least[0].hypot(least[1]), most[0].hypot(most[1]))
+    }
+
     /// Largest value of `normal · p` over the box.
     pub fn support(&self, normal: DVec3) -> f64 {
         (normal * self.min).max(normal * self.max).element_sum()
@@ -106,12 +114,23 @@ pub enum Containment {
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     planes: [(DVec3, f64); 5],
+    /// A place in plan (x, z), and how far away from it what can be seen ends, metres.
+    reach: Option<([f64; 2], f64)>,
 }
 
 impl Frustum {
     /// Tests a box against the planes; may say `Crossing` for a box just outside, never the reverse.
     pub fn contains(&self, bounds: &Aabb) -> Containment {
         let mut containment = Containment::Inside;
+        if let Some((eye, reach_m)) = self.reach {
+            let (least, most) = bounds.distances_in_plan(eye);
+            if least > reach_m {
+                return Containment::Outside;
+            }
+            if most > reach_m {
+                containment = Containment::Crossing;
+            }
+        }
         for &(normal, offset) in &self.planes {
             if bounds.support(normal) < offset {
                 return Containment::Outside;
@@ -121,6 +140,11 @@ impl Frustum {
             }
         }
         containment
+    }
+
+    /// The part of it no further from a place than so many metres in plan.
+    pub fn within(self, eye: DVec3, reach_m: f64) -> Self {
+        Self { reach: reach_m.is_finite().then_some(([eye.x, eye.z], reach_m)), ..self }
     }
 }
 
@@ -259,7 +283,8 @@ impl View {
 
     /// The planes around what can be seen, in the world.
     pub fn frustum(&self) -> Frustum {
-        Frustum { planes: self.planes().map(|(normal, distance)| (normal, normal.dot(self.eye) - distance)) }
+        let planes = self.planes().map(|(normal, distance)| (normal, normal.dot(self.eye) - distance));
+        Frustum { planes, reach: None }
     }
 
     /// Length of the ray through a picture corner at unit depth.

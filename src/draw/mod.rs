@@ -169,6 +169,9 @@ pub struct DrawList {
     pub submission: Submission,
     /// What the device is told of the view where it finds the draws itself.
     pub parameters: Vec<u32>,
+    /// Land further from the eye in plan than this may be left out although it is in sight, metres: infinite unless a
+    /// technique was asked for an end.
+    pub reach_m: f64,
     /// What the view's tolerance was multiplied by because the list would not have fitted its limits: 1 where
     /// nothing was, infinite where no tolerance was kept.
     pub widening: f64,
@@ -275,6 +278,7 @@ impl Default for DrawList {
             uploads: Vec::new(),
             submission: Submission::default(),
             parameters: Vec::new(),
+            reach_m: f64::INFINITY,
             widening: 1.0,
             waiting: 0,
         }
@@ -294,6 +298,7 @@ impl DrawList {
         self.uploads.clear();
         self.submission = Submission::default();
         self.parameters.clear();
+        self.reach_m = f64::INFINITY;
         self.widening = 1.0;
         self.waiting = 0;
     }

@@ -23,7 +23,7 @@ pub struct Corner {
 /// Three corners, counter-clockwise seen from above if the triangle faces up.
 pub type Triangle = [Corner; 3];
 
-/// Twice the area in plan, in samples²; positive if the triangle faces up, 0 if it is degenerate.
+/// Twice the area in plan, in squares of the positions' unit; positive if the triangle faces up, 0 if it is degenerate.
 pub fn doubled_area([a, b, c]: &Triangle) -> i64 {
     let (bx, bz) = (i64::from(b.x) - i64::from(a.x), i64::from(b.z) - i64::from(a.z));
     let (cx, cz) = (i64::from(c.x) - i64::from(a.x), i64::from(c.z) - i64::from(a.z));

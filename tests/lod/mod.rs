@@ -11,6 +11,7 @@ mod spared;
 mod sphere_tree;
 mod strips;
 mod strips_cave;
+mod strips_far;
 mod strips_guard;
 mod strips_order;
 

@@ -17,6 +17,8 @@
 //!   without a depth buffer, and the picture is the same to the pixel;
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
 //!   row and column of pages, where some rays go against the walk ([`order`]);
+//! - the far plane that comes closer as the eye comes down (§4.10, `far`) takes whole pages away: what is left out is land in
+//!   sight, which the list says ([`DrawList::reach_m`]) and the prover takes into account;
 //! - vertices go over into the next level only with `level=uniform`: a bound would be spent on it;
 //! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
 //!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
@@ -60,13 +62,13 @@ use self::pages::{Gaze, Grid, Pages, Row};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
-use self::table::Radial;
+use self::table::{Radial, above_m};
 use self::walk::{Ground, Stream, Worker};
 use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
 use crate::draw::{Draw, DrawList, Draws, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::view::{Containment, View};
+use crate::view::{Containment, Lens, View};
 
 /// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
 /// widened.
@@ -120,6 +122,12 @@ pub const ENTRY: Entry = Entry {
             about: "width of a band around the picture, in parts of it, as fine for level=certified as the picture",
         },
         Setting {
+            key: "far",
+            values: Values::Number(0.0, 1e6),
+            default: "0",
+            about: "how far land is drawn, in heights of the eye above the land under it: low down the horizon closes in; 0: all",
+        },
+        Setting {
             key: "edge",
             values: Values::Number(0.01, 1e4),
             default: "20",
@@ -152,6 +160,8 @@ struct SortedStrips {
     edge: Option<f64>,
     /// Width of the band around the picture that is as fine as the picture, pictures.
     guard: f64,
+    /// Heights of the eye up to which land is drawn; 0: all of it is.
+    far: f64,
     blend: Blend,
     sequence: Sequence,
     topology: Topology,
@@ -201,6 +211,7 @@ impl SortedStrips {
             workers: Vec::new(),
             edge: (!level_is_certified).then(|| settings.number("edge")),
             guard: settings.number("guard"),
+            far: settings.number("far"),
             blend: if level_is_certified { Blend::Off } else { Blend::of(settings.word("blend"), &grid) },
             sequence,
             topology,
@@ -217,7 +228,8 @@ impl SortedStrips {
     /// Finds the pages in sight.
     fn look(&mut self, view: &View) {
         let (field, grid, errors) = (&*self.field, self.pages.grid, &self.errors);
-        let (mut seen, frustum, range) = (Vec::new(), view.frustum(), errors.range());
+        let (mut seen, range) = (Vec::new(), errors.range());
+        let frustum = view.frustum().within(view.eye, self.reach_m(view));
         if range[0] <= range[1] {
             Footprint::new(field, view, range).visit_pages(&grid, |at| {
                 let page = errors.square(grid.level, at);
@@ -228,6 +240,15 @@ impl SortedStrips {
             });
         }
         self.pages.set(seen);
+    }
+
+    /// How far land is drawn (Finch & Bishop, §4.10), metres in plan: not less than a page.
+    fn reach_m(&self, view: &View) -> f64 {
+        if self.far == 0.0 || matches!(view.lens, Lens::Orthographic { .. }) {
+            return f64::INFINITY;
+        }
+        let page_m = f64::from(self.pages.grid.side()) * self.field.spacing[0].max(self.field.spacing[1]);
+        (self.far * above_m(&self.field, view)).max(page_m)
     }
 
     /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the only one;
@@ -362,6 +383,7 @@ impl Technique for SortedStrips {
 
     fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
         self.look(view);
+        list.reach_m = self.reach_m(view);
         let gaze = Gaze::new(&self.field, view);
         let rows = self.pages.rows(&gaze);
         let mut workers = std::mem::take(&mut self.workers);

@@ -189,8 +189,7 @@ impl Radial {
     }
 
     fn of(field: &Field, view: &View, steps: &Steps) -> Self {
-        let eye = [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k]);
-        let above_m = (view.eye.y - ground(field, eye)).max(0.0);
+        let (eye, above_m) = (over(field, view), above_m(field, view));
         // The last entry holds for all greater distances: what does not begin up to there never does.
         let begin = |&entry: &usize| if entry < steps.entries { entry as f64 } else { f64::INFINITY };
         Self {
@@ -208,6 +207,16 @@ impl Radial {
         self.begins_m = self.begins[..=most as usize].iter().map(distance_m).collect();
         self
     }
+}
+
+/// The eye over the lattice, samples.
+fn over(field: &Field, view: &View) -> [f64; 2] {
+    [0, 1].map(|k| ([view.eye.x, view.eye.z][k] - field.origin[k]) / field.spacing[k])
+}
+
+/// How high the eye is above the land under it, metres.
+pub fn above_m(field: &Field, view: &View) -> f64 {
+    (view.eye.y - ground(field, over(field, view))).max(0.0)
 }
 
 /// Height of the land at a position, or at the nearest one of the field, metres: continuous, so that blending is.

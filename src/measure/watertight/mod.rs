@@ -111,19 +111,31 @@ pub fn prove_between(
     fraction_bits: u32,
 ) -> Result<Proof, Box<CounterExample>> {
     assert!(field.size().iter().all(|&n| n <= 1 << (24 - fraction_bits)) && triangles.len() <= 1 << 31);
-    on_the_field(field, triangles, fraction_bits)?;
-    faces_up(triangles)?;
-    one_height_a_vertex(triangles)?;
-    let mut border = edges::border(triangles, |_, _| true)?;
-    edges::no_t_junction(triangles, &border)?;
-    if fraction_bits > 0 {
-        border = edges::between_samples(triangles, border, fraction_bits)?;
-    }
+    let border = one_surface(field, triangles, fraction_bits).map_err(|mut found| {
+        if fraction_bits > 0 {
+            found.text += &format!(", in {}ths of a sample", 1 << fraction_bits);
+        }
+        found
+    })?;
     let strips = sweep::strips(triangles, &border)?;
     sweep::no_gap(field, frustum, &strips)?;
     let doubled_area: i64 = triangles.iter().map(|t| doubled_area(&t.corners)).sum();
     let doubled_area = doubled_area >> (2 * fraction_bits);
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
+}
+
+/// The border, in samples, of triangles that are one surface but perhaps for land covered twice.
+fn one_surface(
+    field: &Field,
+    triangles: &[Drawn],
+    fraction_bits: u32,
+) -> Result<Vec<edges::BorderEdge>, Box<CounterExample>> {
+    on_the_field(field, triangles, fraction_bits)?;
+    faces_up(triangles)?;
+    one_height_a_vertex(triangles)?;
+    let border = edges::border(triangles, |_, _| true)?;
+    edges::no_t_junction(triangles, &border)?;
+    if fraction_bits == 0 { Ok(border) } else { edges::between_samples(triangles, border, fraction_bits) }
 }
 
 /// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
@@ -147,7 +159,7 @@ pub fn prove_with_skirts(
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
 }
 
-/// The proof of a list whose meshes are said to meet in this way, expanded in this view.
+/// The proof of a list whose meshes are said to meet in this way, expanded in this view: up to where it reaches.
 ///
 /// # Panics
 /// As [`prove`].
@@ -158,7 +170,7 @@ pub fn prove_list(
     resident: &Geometry,
     list: &DrawList,
 ) -> Result<Proof, Box<CounterExample>> {
-    let (frame, frustum) = (Frame::placing(field, view), view.frustum());
+    let (frame, frustum) = (Frame::placing(field, view), view.frustum().within(view.eye, list.reach_m));
     let triangles = expand::triangles(field, &frame, resident, list);
     if field.ceiling().is_some() {
         let cave::CaveProof { pairs, doubled_area, seam_edges, open_edges } =

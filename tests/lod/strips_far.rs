@@ -1,0 +1,72 @@
+//! Sorted strips with a far plane that comes closer as the eye comes down.
+
+use std::sync::Arc;
+
+use cuesta::draw::DrawList;
+use cuesta::height::{Field, synth};
+use cuesta::lod::Technique;
+use cuesta::measure::watertight::{self, Kind};
+use cuesta::view::{Lens, Metric, Tolerance, View};
+
+use super::technique;
+
+fn land() -> Arc<Field> {
+    let mut field = synth::synth(synth::Kind::Fractal, [1025, 1025], 7);
+    field.spacing = [10.0, 10.0];
+    Arc::new(field)
+}
+
+fn view(field: &Field, above_m: f64) -> View {
+    View {
+        eye: field.world(500, 500) + glam::DVec3::Y * above_m,
+        world_from_eye: View::turned(40.0, -10.0, 0.0),
+        lens: Lens::Perspective { fov_x: 1.2 },
+        size: [1280, 720],
+        near: 1.0,
+        tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
+    }
+}
+
+fn select(strips: &mut dyn Technique, view: &View) -> DrawList {
+    let mut list = DrawList::default();
+    strips.select(view, &mut list);
+    list
+}
+
+#[test]
+fn land_is_drawn_as_far_as_the_list_says() {
+    let field = land();
+    for level in ["level=certified", "level=uniform"] {
+        let mut strips = technique(&field, "sorted-strips", &[level, "page=16", "far=20"]);
+        let mut whole = technique(&field, "sorted-strips", &[level, "page=16"]);
+        for above_m in [2.0, 20.0, 60.0, 150.0] {
+            let view = view(&field, above_m);
+            let (mut list, all) = (select(&mut *strips, &view), select(&mut *whole, &view));
+            // Pages' own length at least.
+            assert!((list.reach_m - (20.0 * above_m).max(160.0)).abs() < 1e-6, "{} m", list.reach_m);
+            assert!(all.reach_m.is_infinite() && 10 * list.triangles() < 9 * all.triangles(), "{above_m} m");
+            let prove =
+                |list: &DrawList| watertight::prove_list(&field, &view, strips.manner().seams, strips.resident(), list);
+            prove(&list).unwrap_or_else(|why| panic!("{level} {above_m} m: {why}"));
+            // A list that said that it reaches further would be found out.
+            list.reach_m += 400.0;
+            assert_eq!(prove(&list).map_err(|why| why.kind).err(), Some(Kind::Gap), "{level} {above_m} m");
+        }
+    }
+}
+
+/// What it is for: as the eye comes down, there are not many more triangles.
+#[test]
+fn the_load_is_steadier_on_the_way_down() {
+    let field = land();
+    let heights = [1000.0, 500.0, 250.0, 120.0, 60.0, 30.0, 15.0];
+    let load = |far: &str| {
+        let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=8", "page=16", far]);
+        heights.map(|above_m| select(&mut *strips, &view(&field, above_m)).triangles())
+    };
+    let [all, near] = ["far=0", "far=30"].map(load);
+    println!("{all:?} {near:?}");
+    let ratio = |load: [u64; 7]| *load.iter().max().unwrap() as f64 / load[0] as f64;
+    assert!(near[0] == all[0] && ratio(near) < 0.8 * ratio(all), "{all:?} {near:?}");
+}
