@@ -18,7 +18,10 @@
 //! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
 //!   row and column of pages, where some rays go against the walk ([`order`]);
 //! - the far plane that comes closer as the eye comes down (§4.10, `far`) takes whole pages away: what is left out is land in
-//!   sight, which the list says ([`DrawList::reach_m`]) and the prover takes into account;
+//!   sight, which the list says ([`DrawList::reach_m`]) and the prover takes into account. It is not needed to hold the
+//!   load: by apparent size it hardly grows on the way down. Over 4097 × 4097 samples of 10 m, pages of 16, `level=uniform`,
+//!   `edge=8`, 1280 × 720 pixels, from 1000 m down to 15 m, 221 k to 253 k triangles are drawn, with `far=32` 220 k to
+//!   134 k, with `far=8` 145 k to 32 k;
 //! - vertices go over into the next level only with `level=uniform`: a bound would be spent on it;
 //! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
 //!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
@@ -125,7 +128,7 @@ pub const ENTRY: Entry = Entry {
             key: "far",
             values: Values::Number(0.0, 1e6),
             default: "0",
-            about: "how far land is drawn, in heights of the eye above the land under it: low down the horizon closes in; 0: all",
+            about: "land is drawn as far as so many heights of the eye above it and lengths of a page together; 0: all of it is",
         },
         Setting {
             key: "edge",
@@ -160,7 +163,7 @@ struct SortedStrips {
     edge: Option<f64>,
     /// Width of the band around the picture that is as fine as the picture, pictures.
     guard: f64,
-    /// Heights of the eye up to which land is drawn; 0: all of it is.
+    /// Heights of the eye, and lengths of a page, up to which land is drawn; 0: all of it is.
     far: f64,
     blend: Blend,
     sequence: Sequence,
@@ -242,13 +245,13 @@ impl SortedStrips {
         self.pages.set(seen);
     }
 
-    /// How far land is drawn (Finch & Bishop, §4.10), metres in plan: not less than a page.
+    /// How far land is drawn (Finch & Bishop, §4.10), metres in plan.
     fn reach_m(&self, view: &View) -> f64 {
         if self.far == 0.0 || matches!(view.lens, Lens::Orthographic { .. }) {
             return f64::INFINITY;
         }
         let page_m = f64::from(self.pages.grid.side()) * self.field.spacing[0].max(self.field.spacing[1]);
-        (self.far * above_m(&self.field, view)).max(page_m)
+        self.far * (above_m(&self.field, view) + page_m)
     }
 
     /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the only one;
