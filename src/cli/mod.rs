@@ -93,7 +93,7 @@ pub enum Command {
 pub enum Outcome {
     /// Everything asked for was done: exit code 0.
     Done,
-    /// A limit was missed — a crack, an error, a validation message: exit code 1.
+    /// A limit was missed — a crack, an error, a validation message — or not all was tried: exit code 1.
     LimitMissed,
 }
 
