@@ -126,7 +126,8 @@ vec2 relative_plan(ivec2 at) {
 
 vec3 relative_position(ivec2 at, float height) {
     vec2 plan = relative_to_eye(from_anchor(at));
-    precise float above = height - frame.anchor_height;
+    precise float anchor = frame.anchor_height - frame.height_base;
+    precise float above = height - anchor;
     precise float y = above + frame.anchor_height_relative;
     return vec3(plan.x, y, plan.y);
 }

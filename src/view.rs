@@ -244,6 +244,12 @@ impl View {
         Some(Projected { pixel: centre + DVec2::new(p.x, -p.y) * scale, depth })
     }
 
+    /// The same view under a tolerance of `scale` times as many pixels.
+    pub fn under_wider_tolerance(&self, scale: f64) -> Self {
+        let px = self.tolerance.px.max(f64::MIN_POSITIVE) * scale;
+        Self { tolerance: Tolerance { px, ..self.tolerance }, ..*self }
+    }
+
     /// The same picture with so many pixels more on every side.
     pub fn with_margin(&self, px: u32) -> Self {
         let size = self.size.map(|side| side + 2 * px);

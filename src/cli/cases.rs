@@ -73,7 +73,7 @@ struct Flight {
 impl Planned {
     /// Reads and makes the fields and lists the cases.
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
-        let asked = techniques(args)?;
+        let asked = techniques(common, args)?;
         let numbers = [
             ("--tolerance", "pixels", &args.tolerance),
             ("--triangles", "triangles", &args.triangles),
@@ -101,14 +101,14 @@ impl Planned {
 }
 
 /// The techniques asked for, checked; all of the table unless some are named.
-fn techniques(args: &MeasureArgs) -> Result<Vec<Asked>> {
+fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
     let all: Vec<String> = lod::TECHNIQUES.iter().map(|entry| entry.name.to_string()).collect();
     let names = if args.technique.is_empty() { &all } else { &args.technique };
     for (key, _) in &args.settings {
         let has = |name: &String| entry(name).is_ok_and(|(entry, _)| entry.settings.iter().any(|s| s.key == key));
         ensure!(names.iter().any(has), "--set {key}: no technique of this run has this setting");
     }
-    Ok(names.iter().map(|name| asked(name, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
+    Ok(names.iter().map(|name| asked(common, name, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
 fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
@@ -121,7 +121,7 @@ fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
 }
 
 /// A technique once with each combination of the values of its settings.
-fn asked(name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
+fn asked(common: &Common, name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
     let (entry, variant) = entry(name)?;
     let mut all = vec![Vec::new()];
     for (key, values) in choices.iter().filter(|(key, _)| entry.settings.iter().any(|setting| setting.key == key)) {
@@ -129,7 +129,8 @@ fn asked(name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
         all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
     }
     let checked = |own: Vec<(String, String)>| {
-        Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
+        let settings = Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
+        report::warn_of_idle(common, entry, &settings);
         Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
     };
     all.into_iter().map(checked).collect()

@@ -101,7 +101,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         let field = Arc::new(loaded.field);
         let view = args.view.build(&field, args.technique.tolerance()?)?;
         let mut technique = args.technique.build(common, &field)?;
-        report::print(common, &working_set::draw(&field, technique.as_mut(), &view, path)?)?;
+        report::print(common, &working_set::draw(&field, technique.as_mut(), &view, args.look.texture_bytes(), path)?)?;
         return Ok(Outcome::Done);
     }
     if !args.plan {

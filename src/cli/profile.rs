@@ -121,6 +121,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
 /// The technique as it was asked for, and then its other forms under the same settings.
 fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<Form>> {
     let (entry, chosen) = args.technique.settings()?;
+    report::warn_of_idle(common, entry, &chosen);
     let variants = std::iter::once(None).chain(entry.variants.iter().map(|variant| Some(variant.name)));
     let mut variants: Vec<_> = variants.collect();
     variants.sort_by_key(|variant| *variant != chosen.variant());

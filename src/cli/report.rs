@@ -15,6 +15,7 @@ use super::Common;
 use crate::height::Error;
 use crate::height::progress::Progress;
 use crate::height::save::replace;
+use crate::lod::{Entry, Settings};
 
 /// A line on stdout.
 ///
@@ -72,6 +73,11 @@ pub fn warn(common: &Common, text: &str) {
     if !common.quiet {
         note(format_args!("warning: {text}"));
     }
+}
+
+/// Tells of settings that do nothing beside the others.
+pub fn warn_of_idle(common: &Common, entry: &Entry, settings: &Settings) {
+    settings.idle(entry).iter().for_each(|idle| warn(common, &format!("--set {idle}")));
 }
 
 /// As [`spinner`] for a technique, with the share that is done as soon as there is one.

@@ -342,6 +342,11 @@ fn demo_options(options: Options) -> Options {
 }
 
 impl LookArgs {
+    /// Device memory for textures that are there in parts, bytes.
+    pub fn texture_bytes(&self) -> u64 {
+        1_000_000 * self.texture_memory
+    }
+
     /// The look, and the picture it lays over the field.
     pub fn build(&self, terrain: &str) -> Result<(Look, Option<image::RgbaImage>)> {
         let colour = match (self.colour, &self.overlay) {
@@ -374,7 +379,7 @@ impl LookArgs {
             bail!("--fog {}: expected a density of 0 or more per metre", self.fog);
         }
         let look = Look { colour, sun, fog: self.fog, wireframe: self.wireframe, ..defaults };
-        let look = Look { texture_bytes: 1_000_000 * self.texture_memory, ..look };
+        let look = Look { texture_bytes: self.texture_bytes(), ..look };
         Ok((self.ground.over(look)?, picture))
     }
 
@@ -408,6 +413,7 @@ impl TechniqueArgs {
     /// The technique, prepared for the field.
     pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
         let (entry, settings) = self.settings()?;
+        report::warn_of_idle(common, entry, &settings);
         let _spinner = report::preparing(common, entry.name, &settings.progress);
         entry.prepare(field, &settings).map_err(anyhow::Error::msg)
     }

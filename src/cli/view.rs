@@ -83,6 +83,8 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         bail!("--seconds: expected a number of seconds");
     }
     let target = target(args)?;
+    let technique = args.technique.settings()?;
+    report::warn_of_idle(common, technique.0, &technique.1);
     let field = Arc::new(args.terrain.load(common)?.field);
     let (look, overlay) = args.look.build(&args.terrain.terrain)?;
     let summary = viewer::run(&Setup {
@@ -90,7 +92,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         view: args.view.build(&field, args.technique.tolerance()?)?,
         field,
         near: args.view.near,
-        technique: args.technique.settings()?,
+        technique,
         choices: args.technique.settings.clone(),
         overlay: overlay.or(args.look.picture(&args.terrain.terrain)?),
         look,

@@ -10,26 +10,26 @@ use super::report::save;
 use crate::draw::DrawList;
 use crate::height::{Error, Field};
 use crate::lod::Technique;
-use crate::texture::pieces::Cutter;
+use crate::texture::ground_maps::{GroundCut, GroundSet, MOST_SLOTS, SLOT_LEVEL};
 use crate::texture::resolution::texture_area;
 use crate::texture::wedges;
-use crate::texture::working_set::{Node, Stop, WorkingSet};
+use crate::texture::working_set::{Node, WorkingSet};
 use crate::view::View;
 
 /// Side of the picture, pixels.
 const SIDE_PX: u32 = 1024;
-/// Level of the whole map, 2^36 texels, and of a node's texture at most, 32 × 32.
-const MAP_LEVEL: i32 = 18;
-const SLOT_LEVEL: i32 = 5;
-/// Texels a pixel along an axis.
-const QUALITY: f64 = 1.0;
-
-/// What a view needs.
+/// The nodes that a view needs, as the device holds them.
 #[derive(Serialize)]
 pub struct Needed {
     map_texels: f64,
     wedges: usize,
     nodes: usize,
+    /// Nodes that the texture memory holds.
+    slots: u32,
+    /// Bytes of the nodes on the device.
+    bytes: u64,
+    /// Length of a texel, pixels: 1, or longer where the memory does not hold that.
+    texel_px: f64,
     texels: f64,
     texels_a_pixel: f64,
     /// Nodes by level, from the root's on.
@@ -44,28 +44,39 @@ struct Window {
     side: f64,
 }
 
-/// Works out what a view needs, and draws it: each node in the colour of its level, darker where its texture is smaller;
+/// Finds the nodes that a view needs within `texture_bytes`, and draws them: each node in the colour of its level, darker where its texture is smaller;
 /// grey is not needed. The picture shows the smallest square around all nodes below the root.
-pub fn draw(field: &Field, technique: &mut dyn Technique, view: &View, path: &Path) -> Result<Needed> {
+pub fn draw(
+    field: &Field,
+    technique: &mut dyn Technique,
+    view: &View,
+    texture_bytes: u64,
+    path: &Path,
+) -> Result<Needed> {
     let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
     ensure!(is_png, Error::new(path.display().to_string(), "extension", "expected .png"));
+    let cut = GroundCut::new(field, texture_bytes, MOST_SLOTS as u32).map_err(anyhow::Error::msg)?;
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let wedges = wedges::of_list(field, view, technique.resident(), &list);
-    let mut set = WorkingSet::new(MAP_LEVEL, Stop::Largest(SLOT_LEVEL));
-    wedges::show(&mut set, view, Cutter::new(view, QUALITY, MAP_LEVEL, SLOT_LEVEL), &wedges);
+    let mut needed = GroundSet::new(cut);
+    needed.show(view, &wedges);
+    let set = needed.set();
     let mut levels = Vec::new();
     for (node, _) in set.nodes() {
         levels.resize(levels.len().max(node.level as usize + 1), 0);
         levels[node.level as usize] += 1;
     }
-    let window = Window::around(&set);
-    save(path, &picture(&set, &window, levels.len()))?;
+    let window = Window::around(set);
+    save(path, &picture(set, &window, levels.len()))?;
     let root = f64::from(wedges::root_side(field));
     Ok(Needed {
-        map_texels: texture_area(MAP_LEVEL),
+        map_texels: texture_area(cut.map_level()),
         wedges: wedges.len(),
         nodes: set.nodes().count(),
+        slots: cut.slots,
+        bytes: set.nodes().count() as u64 * GroundCut::tile_bytes(),
+        texel_px: needed.texel_px(),
         texels: set.texels(),
         texels_a_pixel: set.texels() / f64::from(view.size[0]) / f64::from(view.size[1]),
         levels,

@@ -82,7 +82,10 @@ fn each_triangle(
     let geometry = geometry(draw.source, resident, list);
     let frame = &Frame { fraction_bits: list.fraction_bits as i32, ..*frame };
     let placed = |instance: u32| &list.instances[instance as usize];
-    let corner = |instance, index| corner(field, frame, geometry, draw.source, placed(instance), index);
+    let corner = |instance, index| {
+        let corner = corner(field, frame, geometry, draw.source, placed(instance), index);
+        Corner { y: list.absolute_height(corner.y), ..corner }
+    };
     assemble(geometry, draw, corner, |instance, corners| visit(Drawn { corners, instance }));
 }
 

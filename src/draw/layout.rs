@@ -88,6 +88,8 @@ shared! {
         detail_scale: vec2,
         /// Bits of corners' positions that are parts of a sample: the list's.
         fraction_bits: int,
+        /// The height that heights of vertices are relative to, metres: the list's.
+        height_base: float,
     }
 
     /// A lattice mesh placed on the field.

@@ -163,6 +163,9 @@ pub struct DrawList {
     /// Bits of explicit vertices' positions that are parts of a sample: 0 where all lie on samples. The corners of the
     /// list's triangles have as many, whatever their source.
     pub fraction_bits: u32,
+    /// The height that heights of explicit vertices are relative to, metres. Near the eye's height, it keeps those
+    /// around the eye exact where single precision would round them.
+    pub height_base: f32,
     /// Changes to the resident geometry.
     pub uploads: Vec<Upload>,
     /// How the draws reach the device.
@@ -275,6 +278,7 @@ impl Default for DrawList {
             instances: Vec::new(),
             streamed: Geometry::default(),
             fraction_bits: 0,
+            height_base: 0.0,
             uploads: Vec::new(),
             submission: Submission::default(),
             parameters: Vec::new(),
@@ -295,12 +299,18 @@ impl DrawList {
         self.streamed.normals.clear();
         self.streamed.indices.clear();
         self.fraction_bits = 0;
+        self.height_base = 0.0;
         self.uploads.clear();
         self.submission = Submission::default();
         self.parameters.clear();
         self.reach_m = f64::INFINITY;
         self.widening = 1.0;
         self.waiting = 0;
+    }
+
+    /// The height above zero of an explicit vertex's own height, metres, rounded.
+    pub fn absolute_height(&self, height: f32) -> f32 {
+        (f64::from(height) + f64::from(self.height_base)) as f32
     }
 
     /// Triangles the list submits, degenerate ones included.

@@ -280,7 +280,7 @@ pub fn explicit_position(frame: &Frame, instance: &Instance, vertex: &ExplicitVe
 /// its height.
 pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
     let [x, z] = relative_to_eye(frame, from_anchor(frame, at));
-    [x, (height - frame.anchor_height) + frame.anchor_height_relative, z]
+    [x, (height - (frame.anchor_height - frame.height_base)) + frame.anchor_height_relative, z]
 }
 
 /// From the anchor to a corner's position, samples: whole ones are exact however far away the anchor is from the field.

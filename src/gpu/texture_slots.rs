@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use ash::vk;
 
 use super::device::Gpu;
@@ -27,6 +27,8 @@ use crate::view::View;
 
 /// The most bytes that a frame copies into slots.
 const FRAME_BYTES: u64 = 4 << 20;
+/// More rounds than any view takes to load: each brings one tile at least, and no table of slots has as many.
+const MAX_ROUNDS: u32 = 100_000;
 
 /// The slots.
 pub struct TextureSlots {
@@ -196,9 +198,12 @@ impl Overlay {
         Ok(())
     }
 
-    /// Goes on until all that a view needs, of the list seen last, is there. Nothing may be under way on the device.
+    /// Loads all that a view needs of the list seen last. Nothing may be under way on the device.
+    ///
+    /// # Errors
+    /// If something is still missing after [`MAX_ROUNDS`] rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
-        loop {
+        for _ in 0..MAX_ROUNDS {
             once(gpu, |r| self.look(r, view))?;
             if self.figures().is_none_or(|figures| figures.waiting == 0) {
                 return Ok(());
@@ -209,6 +214,7 @@ impl Overlay {
                 Parts::Ground(maps) => maps.wait(),
             }
         }
+        bail!("textures of the view are still missing after {MAX_ROUNDS} rounds")
     }
 
     /// What is held, if something is there in parts.

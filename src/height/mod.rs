@@ -35,6 +35,7 @@ mod usgs_dem;
 
 pub use georef::metres_per_degree;
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
+pub use raster::MAX_SIDE;
 pub use sample::{Order, SampleType};
 
 use std::ops::Range;

@@ -199,16 +199,21 @@ impl Raster {
     }
 }
 
+/// Samples of a side of a field at most, tiling included: lattice coordinates are i32, and the last block of a
+/// level may end beyond the field by its own length.
+pub const MAX_SIDE: u32 = 1 << 30;
+
 /// How often the field repeats.
 fn tiles(name: &str, [w, h]: [u32; 2], options: &Options) -> Result<[u32; 2], Error> {
     let [nx, nz] = options.tiles.unwrap_or([1, 1]);
-    // Lattice coordinates are i32 in places.
-    let fits = |n: u32, side: u32| n > 0 && n.checked_mul(side).is_some_and(|n| n <= i32::MAX as u32);
+    let fits = |n: u32, side: u32| n > 0 && n.checked_mul(side).is_some_and(|n| n <= MAX_SIDE);
     match fits(nx, w) && fits(nz, h) {
         true => Ok([nx, nz]),
-        false => {
-            Err(Error::new(name, "--tile", format!("expected at most 2^31 samples a side, found {nx}x{nz} tiles")))
-        }
+        false => Err(Error::new(
+            name,
+            "--tile",
+            format!("expected at most 2^30 samples a side, found {nx}x{nz} tiles of {w}x{h}"),
+        )),
     }
 }
 

@@ -18,6 +18,7 @@ pub const ENTRY: Entry = Entry {
     paper: "none",
     variants: &[],
     settings: &[],
+    needs: &[],
     most_samples: 1 << 32,
     takes_endless: false,
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Manner, Submission};
 use crate::height::Field;
 use crate::view::{Tolerance, View};
-pub use settings::{Setting, Settings, Values};
+pub use settings::{Need, Setting, Settings, Values};
 
 /// A way to choose what is drawn.
 pub trait Technique: Send {
@@ -117,6 +117,8 @@ pub struct Entry {
     pub variants: &'static [Variant],
     /// What can be set, with defaults.
     pub settings: &'static [Setting],
+    /// Which of them do nothing beside some words of others.
+    pub needs: &'static [Need],
     /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
     pub most_samples: u64,
     /// Whether it takes a land without samples ([`Field::land`]).
@@ -174,27 +176,24 @@ pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>
     let mut under = |px: f64| select(&View { tolerance: Tolerance { px, ..view.tolerance }, ..*view });
     let [mut below, mut above] = [0, 1];
     let mut selected = under(px_at(above));
-    while selected.is_none() {
-        if px_at(above) == f64::MAX {
-            let selected = under(f64::INFINITY).expect("nothing is too much where no tolerance is kept");
-            return (selected, f64::INFINITY);
-        }
+    while selected.is_none() && px_at(above) < f64::MAX {
         (below, above) = (above, 2 * above);
         selected = under(px_at(above));
     }
-    let mut at = |steps: i32| under(px_at(steps));
-    while above - below > 1 {
+    let mut is_last = selected.is_some();
+    while selected.is_some() && above - below > 1 {
         let middle = below.midpoint(above);
-        match at(middle) {
+        let finer = under(px_at(middle));
+        is_last = finer.is_some();
+        match finer {
             Some(finer) => (above, selected) = (middle, Some(finer)),
-            None => (below, selected) = (middle, None),
+            None => below = middle,
         }
     }
-    loop {
-        if let Some(selected) = selected.take().or_else(|| at(above)) {
-            return (selected, factor(above));
-        }
-        above += 1;
+    // Callers keep state: the last call must be that of the answer.
+    match if is_last { selected } else { under(px_at(above)) } {
+        Some(selected) => (selected, factor(above)),
+        None => (under(f64::INFINITY).expect("nothing is too much where no tolerance is kept"), f64::INFINITY),
     }
 }
 

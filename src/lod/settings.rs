@@ -25,6 +25,17 @@ pub struct Setting {
     pub about: &'static str,
 }
 
+/// A setting that does something only where another one is one of these words.
+#[derive(Clone, Copy, Debug)]
+pub struct Need {
+    /// Its key.
+    pub key: &'static str,
+    /// The other's.
+    pub other: &'static str,
+    /// The other's words.
+    pub words: &'static [&'static str],
+}
+
 /// A variant and values for all settings of one technique.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -60,6 +71,17 @@ impl Settings {
     pub fn defaults(entry: &Entry) -> Self {
         let values = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
         Self { variant: None, values, progress: Progress::default() }
+    }
+
+    /// What was set on `entry` and does nothing beside the other settings: a line each.
+    pub fn idle(&self, entry: &Entry) -> Vec<String> {
+        let is_set = |key: &str| self.values.iter().any(|(s, value)| s.key == key && value != s.default);
+        let is_idle = |need: &&Need| is_set(need.key) && !need.words.contains(&self.word(need.other));
+        let line = |&Need { key, other, words }: &Need| {
+            let (value, word) = (self.word(key), self.word(other));
+            format!("{key}={value} does nothing with {other}={word}, expected {other}={}", words.join("|"))
+        };
+        entry.needs.iter().filter(is_idle).map(line).collect()
     }
 
     /// The variant chosen, if not the default one.

@@ -67,6 +67,24 @@ pub struct ScenePlan {
     pub forced: Forced,
 }
 
+/// Pages of fewer samples a side than 2^4 are not worth their lookup.
+const MIN_PAGE_SHIFT: u32 = 4;
+
+/// The side of a page of the height texture as a power of two: the largest whose pages hold at most an eighth more texels
+/// than samples or, where none does, that with the fewest texels. 0: one image holds all samples.
+fn page_shift(stored: [u32; 2], device: &DeviceLimits) -> u32 {
+    if stored.iter().all(|&n| n <= device.image_side) {
+        return 0;
+    }
+    let largest = device.image_side.ilog2();
+    let pages = |shift: u32| stored.iter().map(|n| u64::from(n.div_ceil(1 << shift))).product::<u64>();
+    let texels = |shift: u32| pages(shift) << (2 * shift);
+    let samples: u64 = stored.iter().map(|&n| u64::from(n)).product();
+    let shifts = || (MIN_PAGE_SHIFT..=largest).rev().filter(|&shift| pages(shift) <= u64::from(device.image_layers));
+    let tight = shifts().find(|&shift| texels(shift) <= samples + samples / 8);
+    tight.or_else(|| shifts().min_by_key(|&shift| texels(shift))).unwrap_or(largest)
+}
+
 /// One feature of a plan and what became of it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Decision {
@@ -83,7 +101,7 @@ impl ScenePlan {
     /// few parts of the ground that there must be.
     pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
         let (stored, is_endless) = (field.stored(), field.land().is_some());
-        let page_shift = if stored.iter().all(|&n| n <= device.image_side) { 0 } else { device.image_side.ilog2() };
+        let page_shift = page_shift(stored, device);
         let mut plan = Self {
             coded: matches!(field.samples(), Samples::Coded { .. }),
             tiled: field.is_tiled(),
@@ -204,5 +222,30 @@ impl ScenePlan {
 
     fn samples(&self) -> u64 {
         u64::from(self.stored[0]) * u64::from(self.stored[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_hold_few_texels_more_than_samples() {
+        let device = DeviceLimits { image_side: 16_384, image_layers: 2048, filters_heights: true };
+        for (stored, shift) in [
+            ([16_384, 16_384], 0),
+            ([16_385, 16_385], 10),
+            ([16_385, 2], 4),
+            ([32_768, 32_768], 14),
+            ([40_000, 40_000], 12),
+            ([131_072, 131_072], 14),
+        ] {
+            let found = page_shift(stored, &device);
+            assert_eq!(found, shift, "{stored:?}");
+            let pages = stored.iter().map(|n| u64::from(n.div_ceil(1 << found))).product::<u64>();
+            assert!(found == 0 || pages <= 2048, "{stored:?}: {pages} pages");
+        }
+        // What no layers hold is refused by the largest pages.
+        assert_eq!(page_shift([1 << 30, 1 << 30], &device), 14);
     }
 }

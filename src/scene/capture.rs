@@ -33,8 +33,7 @@ impl Stage {
         let resident = technique.resident();
         self.each_batch(resident, view, |_, batch, list, records| {
             for part in batch {
-                let geometry = expand::geometry(part.draw.source, resident, list);
-                triangles(geometry, part, records, |drawn, corners| {
+                triangles(resident, list, part, records, |drawn, corners| {
                     let relative = corners.map(|k| records[k as usize].relative);
                     found[usize::from(expand::is_upright(&drawn))].push(AsDrawn { drawn, relative });
                 });
@@ -57,8 +56,7 @@ impl Stage {
             let oracle = oracle.as_mut().expect("just made");
             let mut surface = Vec::new();
             for part in batch {
-                let geometry = expand::geometry(part.draw.source, resident, list);
-                triangles(geometry, part, records, |drawn, corners| {
+                triangles(resident, list, part, records, |drawn, corners| {
                     // Skirts are no part of the surface.
                     if doubled_area(&drawn.corners) != 0 {
                         surface.push(corners);
@@ -68,7 +66,11 @@ impl Stage {
             let frame = stage.look.frame(&stage.field, view, stage.range);
             for some in surface.chunks(oracle::TRIANGLES) {
                 let mut recording = stage.frames.begin()?;
-                let nothing = DrawList { fraction_bits: list.fraction_bits, ..DrawList::default() };
+                let nothing = DrawList {
+                    fraction_bits: list.fraction_bits,
+                    height_base: list.height_base,
+                    ..DrawList::default()
+                };
                 stage.terrain.prepare(&mut recording, &frame, &nothing)?;
                 let scene = stage.terrain.scene_set(&recording);
                 oracle.record(&mut recording, scene, view.size, some)?;
@@ -116,11 +118,18 @@ impl Stage {
 }
 
 /// Calls `visit` for every triangle of a part, of its surface or of its skirts, with the records of its corners.
-fn triangles(geometry: &Geometry, part: &Part, records: &[Captured], mut visit: impl FnMut(Drawn, [u32; 3])) {
+fn triangles(
+    resident: &Geometry,
+    list: &DrawList,
+    part: &Part,
+    records: &[Captured],
+    mut visit: impl FnMut(Drawn, [u32; 3]),
+) {
+    let geometry = expand::geometry(part.draw.source, resident, list);
     let corner = |instance: u32, index: u32| {
         let k = part.record(instance, index);
         let Captured { position: [x, z], height, .. } = records[k];
-        (Corner { x, z, y: height }, k as u32)
+        (Corner { x, z, y: list.absolute_height(height) }, k as u32)
     };
     expand::assemble(geometry, &part.draw, corner, |instance, corners: [(Corner, u32); 3]| {
         let drawn = Drawn { corners: corners.map(|(corner, _)| corner), instance };

@@ -1,6 +1,6 @@
 //! Forms of techniques that the battery tries.
 
-use crate::lod::{self, Entry, Settings, TECHNIQUES, Values};
+use crate::lod::{self, Entry, Need, Settings, TECHNIQUES, Values};
 
 /// A technique with its settings.
 #[derive(Clone)]
@@ -57,7 +57,7 @@ fn named(name: &str) -> Result<Form, String> {
     Ok(Form::new(entry, Some(found.name), &[]))
 }
 
-/// The same, and then each with every word of every setting, one at a time.
+/// The same, and then each with every word of every setting, one at a time, and with what it needs to do something.
 pub fn every_word(techniques: &[String]) -> Result<Vec<Form>, String> {
     let plain = plain(techniques)?;
     let with_words = |form: Form| {
@@ -68,7 +68,13 @@ pub fn every_word(techniques: &[String]) -> Result<Vec<Form>, String> {
         // A variant differs from the default in how it is submitted: one word of it stands for all.
         let words: Vec<_> = if form.variant.is_none() { words.collect() } else { Vec::new() };
         let (entry, variant) = (form.entry, form.variant);
-        std::iter::once(form).chain(words.into_iter().map(move |word| Form::new(entry, variant, &[word])))
+        let defaults = Settings::defaults(entry);
+        let with = move |word: (&'static str, &'static str)| {
+            let is_idle = |need: &&Need| need.key == word.0 && !need.words.contains(&defaults.word(need.other));
+            let needed = entry.needs.iter().filter(is_idle).map(|need| (need.other, need.words[0]));
+            Form::new(entry, variant, &std::iter::once(word).chain(needed).collect::<Vec<_>>())
+        };
+        std::iter::once(form).chain(words.into_iter().map(with))
     };
     Ok(plain.into_iter().flat_map(with_words).collect())
 }

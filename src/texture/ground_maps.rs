@@ -14,21 +14,21 @@ use super::node_table::NodeTable;
 use super::picture_maps::Figures;
 use super::pieces::Cutter;
 use super::slots::{Fill, Slots};
-use super::wedges::{self, root_side};
+use super::wedges::{self, Wedge, root_side};
 use super::working_set::{Node, Stop, WorkingSet};
 use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
 use crate::view::View;
 
 /// Level of a node's texture, and cells along its side.
-const SLOT_LEVEL: i32 = 6;
+pub const SLOT_LEVEL: i32 = 6;
 const CELLS: u32 = 1 << SLOT_LEVEL;
 /// Level of the whole map: 2^36 texels.
 const MAP_LEVEL: i32 = 18;
 /// The least slots kept.
 const LEAST_SLOTS: u64 = 64;
 /// The most: no screen needs more.
-const MOST_SLOTS: u64 = 4096;
+pub const MOST_SLOTS: u64 = 4096;
 /// Slots that serve for nodes that are to come: the root, and some coarser ones.
 const SPARE: u32 = 16;
 
@@ -72,7 +72,7 @@ impl GroundCut {
     }
 
     /// Level of the whole map: 18, or more where samples are closer than its texels.
-    fn map_level(&self) -> i32 {
+    pub fn map_level(&self) -> i32 {
         MAP_LEVEL.max(self.root_shift as i32)
     }
 
@@ -82,38 +82,27 @@ impl GroundCut {
     }
 }
 
-/// The working set.
-pub struct GroundMaps {
-    field: Arc<Field>,
+/// The nodes that a frame's wedges need, as many as there are slots for.
+pub struct GroundSet {
     cut: GroundCut,
     set: WorkingSet,
-    slots: Slots,
-    table: NodeTable,
     /// Texels a pixel along an axis.
     quality: f64,
 }
 
-impl GroundMaps {
-    /// For a field.
-    pub fn new(field: &Arc<Field>, cut: GroundCut) -> Self {
-        let ground = Ground::new(field);
-        let slots = Slots::new(cut.slots, Arc::new(move |node: Node| ground.tile(node, CELLS)));
-        let set = WorkingSet::new(cut.map_level(), Stop::Largest(SLOT_LEVEL));
-        Self { field: Arc::clone(field), cut, set, slots, table: NodeTable::new(), quality: 1.0 }
+impl GroundSet {
+    /// An empty set.
+    pub fn new(cut: GroundCut) -> Self {
+        Self { cut, set: WorkingSet::new(cut.map_level(), Stop::Largest(SLOT_LEVEL)), quality: 1.0 }
     }
 
-    /// How it is kept.
-    pub fn cut(&self) -> &GroundCut {
-        &self.cut
-    }
-
-    /// Works out which nodes a list's wedges need: a texel a pixel, or as many as there is room for.
-    pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
-        let wedges = wedges::of_list(&self.field, view, resident, list);
+    /// Finds the nodes that wedges need: a texel a pixel, or fewer until they fit the slots. It ends: what covers less than
+    /// 2^-126 texels needs none.
+    pub fn show(&mut self, view: &View, wedges: &[Wedge]) {
         self.quality = 1.0;
         loop {
             let cutter = Cutter::new(view, self.quality, self.cut.map_level(), SLOT_LEVEL);
-            wedges::show(&mut self.set, view, cutter, &wedges);
+            wedges::show(&mut self.set, view, cutter, wedges);
             if self.set.nodes().count() <= (self.cut.slots - SPARE) as usize {
                 return;
             }
@@ -121,11 +110,48 @@ impl GroundMaps {
         }
     }
 
+    /// The nodes with the levels of their textures.
+    pub fn set(&self) -> &WorkingSet {
+        &self.set
+    }
+
+    /// Length of a texel, pixels: 1, or longer where the slots do not hold that.
+    pub fn texel_px(&self) -> f64 {
+        1.0 / self.quality
+    }
+}
+
+/// The working set on the device.
+pub struct GroundMaps {
+    field: Arc<Field>,
+    needed: GroundSet,
+    slots: Slots,
+    table: NodeTable,
+}
+
+impl GroundMaps {
+    /// For a field.
+    pub fn new(field: &Arc<Field>, cut: GroundCut) -> Self {
+        let ground = Ground::new(field);
+        let slots = Slots::new(cut.slots, Arc::new(move |node: Node| ground.tile(node, CELLS)));
+        Self { field: Arc::clone(field), needed: GroundSet::new(cut), slots, table: NodeTable::new() }
+    }
+
+    /// How it is kept.
+    pub fn cut(&self) -> &GroundCut {
+        &self.needed.cut
+    }
+
+    /// Finds the nodes that the wedges of a list need.
+    pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
+        self.needed.show(view, &wedges::of_list(&self.field, view, resident, list));
+    }
+
     /// Chooses what they are drawn with; what is to be filled in before, at most so many nodes.
     pub fn look(&mut self, most_fills: usize) -> Vec<Fill> {
         let fills = self.slots.begin(most_fills);
         self.table.clear();
-        for (node, _) in self.set.nodes() {
+        for (node, _) in self.needed.set.nodes() {
             self.table.enter(&self.slots.serve(node));
         }
         self.slots.finish();
@@ -139,7 +165,7 @@ impl GroundMaps {
 
     /// Texels that the wedges seen last need.
     pub fn texels(&self) -> f64 {
-        self.set.texels()
+        self.needed.set.texels()
     }
 
     /// Waits until all that was asked for is made.
@@ -151,7 +177,7 @@ impl GroundMaps {
     pub fn figures(&self) -> Figures {
         let held = self.slots.held();
         let bytes = held as u64 * GroundCut::tile_bytes();
-        let (slots, waiting) = (self.cut.slots as usize, self.slots.waiting());
-        Figures { slots, held, bytes, waiting, texel_px: 1.0 / self.quality }
+        let (slots, waiting) = (self.needed.cut.slots as usize, self.slots.waiting());
+        Figures { slots, held, bytes, waiting, texel_px: self.needed.texel_px() }
     }
 }

@@ -17,6 +17,9 @@ use super::resolution::texture_area;
 const MIDDLE: f64 = 0.45;
 const RADIUS: f64 = 0.55;
 
+/// Levels end here, finer and coarser: 4^500 texels are still an f64.
+const MAX_LEVEL: i32 = 500;
+
 /// A wedge as its spheres know it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spheres {
@@ -48,10 +51,10 @@ impl Spheres {
 
     /// The level for a viewpoint, reached from the last one by raising and lowering.
     pub fn follow(&self, mut level: i32, eye: DVec3) -> i32 {
-        while self.contains(level, eye) {
+        while level < MAX_LEVEL && self.contains(level, eye) {
             level += 1;
         }
-        while !self.contains(level - 1, eye) {
+        while level > -MAX_LEVEL && !self.contains(level - 1, eye) {
             level -= 1;
         }
         level

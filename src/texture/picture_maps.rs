@@ -216,7 +216,8 @@ impl PictureMaps {
         }
         let texel_m = self.land.spacing[0].max(self.land.spacing[1]) * f64::from(1u32 << (self.cut.page_shift + up))
             / f64::from(self.cut.cells);
-        if up == 0 || texel_m <= texel_px * pixel_m(view, &bounds) {
+        // Any texel is short enough at last: few slots may not hold the finest tiles around the eye.
+        if up == 0 || texel_px == f64::INFINITY || texel_m <= texel_px * pixel_m(view, &bounds) {
             found.push(node);
             return (found.len() <= most).then_some(());
         }
@@ -232,10 +233,10 @@ fn entry(slot: u32, up: u32) -> u32 {
     slot << 4 | up
 }
 
-/// Size of a pixel at the nearest point of a box, metres.
+/// Size of a pixel at the nearest point of a box in front of the near plane, metres.
 fn pixel_m(view: &View, bounds: &Aabb) -> f64 {
     match view.lens {
-        Lens::Perspective { .. } => bounds.distance(view.eye) / view.focal_px(),
+        Lens::Perspective { .. } => bounds.distance(view.eye).max(view.near) / view.focal_px(),
         Lens::Orthographic { .. } => 1.0 / view.focal_px(),
     }
 }
@@ -385,6 +386,20 @@ mod tests {
             before = worst;
         }
         assert_eq!(before, 1.0);
+    }
+
+    /// The eye is in the boxes of a tile of every level, more than there are slots for.
+    #[test]
+    fn few_slots_come_to_rest_within_the_range_of_heights() {
+        let mut maps = maps(500_000);
+        let inside = view(128.0, 20.0, -5.0);
+        let (bounds, most) = (
+            |up: u32| maps.land.bounds(up, [127 >> (maps.cut.page_shift + up), 7 >> up], maps.cut.page_shift),
+            maps.cut.slots - SPARE,
+        );
+        assert!((0..=maps.cut.depth).all(|up| bounds(up).is_some_and(|bounds| bounds.distance(inside.eye) == 0.0)));
+        assert!(3 * maps.cut.depth + 1 > most, "{most} slots, {} levels", maps.cut.depth);
+        settled(&mut maps, &inside);
     }
 
     #[test]

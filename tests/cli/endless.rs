@@ -35,5 +35,11 @@ fn a_working_set_is_drawn() {
     let colours: std::collections::HashSet<_> = picture.pixels().map(|pixel| pixel.0).collect();
     assert!(colours.len() > 4, "a node's level has a colour: {}", colours.len());
     assert!(needed["nodes"].as_u64() > Some(50) && needed["texels_a_pixel"].as_f64() < Some(4.0), "{needed}");
+    assert_eq!(needed["texel_px"], 1.0, "{needed}");
+    // As on the device, texels are longer where the memory does not hold them.
+    let few = [&["info", "demo", "--working-set", "set.png", "--texture-memory", "2"][..], &view].concat();
+    let few = json(folder.path(), &few);
+    assert!(few["nodes"].as_u64() <= few["slots"].as_u64() && few["nodes"].as_u64() < needed["nodes"].as_u64());
+    assert!(few["texel_px"].as_f64() > Some(1.0) && few["bytes"].as_u64() < Some(2_000_000), "{few}");
     refused(folder.path(), &["info", "demo", "--working-set", "set.txt"], &["set.txt", ".png"]);
 }

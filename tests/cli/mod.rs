@@ -2,6 +2,7 @@
 
 mod endless;
 mod robust;
+mod watchdog;
 #[cfg(feature = "vulkan")]
 mod with_a_device;
 
@@ -148,6 +149,19 @@ fn export_writes_meshes_that_others_read() {
     let obj = std::fs::read_to_string(folder.path().join("c.obj")).unwrap();
     let faces = obj.lines().filter(|line| line.starts_with("f ")).count();
     assert_eq!(faces as u64, coarse["triangles"].as_u64().unwrap());
+}
+
+#[test]
+fn a_setting_that_does_nothing_is_told() {
+    let folder = folder();
+    synth(folder.path(), "fractal", "65x49", "a.tif");
+    let export = ["export", "a.tif", "-o", "m.ply", "--technique", "sorted-strips", "--set", "blend=end"];
+    let told = |more: &[&str]| {
+        let output = cuesta(folder.path(), &[&export[..], more].concat());
+        assert_eq!(code(&output), 0);
+        String::from_utf8_lossy(&output.stderr).contains("warning: --set blend=end does nothing with level=certified")
+    };
+    assert!(told(&[]) && !told(&["--quiet"]) && !told(&["--set", "level=uniform"]));
 }
 
 /// Every edge joins as many triangles one way as the other way, but at the field's rim.

@@ -15,6 +15,7 @@ use cuesta::lod::Technique;
 use cuesta::lod::clusters::mesh::Mesh;
 use cuesta::measure::{geometric, watertight};
 use cuesta::view::{Lens, Metric, Tolerance, View};
+use glam::DVec3;
 
 use super::{heights, technique};
 
@@ -226,4 +227,37 @@ fn no_weights_exceed_the_error() {
     }
     // And the errors are no more than needed.
     assert!(closest[2..].iter().all(|&share| share > 0.97), "{closest:?} of the error");
+}
+
+/// Straight down on land so steep that it stays in front of the eye under no finite tolerance with few enough blocks.
+#[test]
+fn where_no_finite_tolerance_fits_the_root_is_drawn() {
+    let field = Arc::new(synth(Kind::Checker, [4097, 1537], 1));
+    let down = |above_m: f64| View {
+        eye: DVec3::new(2048.0, above_m, 768.0),
+        world_from_eye: View::turned(0.0, -90.0, 0.0),
+        lens: Lens::Perspective { fov_x: 1.2 },
+        size: [640, 360],
+        near: 0.1,
+        tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
+        time_s: 0.0,
+    };
+    let high = f64::from(field.statistics().max);
+    for name in ["clusters", "clusters:draw-per-block", "clusters:gpu-driven"] {
+        for settings in [&["block=8"][..], &["block=8", "morph=on", "seams=skirts"], &["block=8", "morph=distance"]] {
+            let mut technique = technique(&field, name, settings);
+            let mut scales = Vec::new();
+            for above_m in [33_000.0, high + 1000.0, high + 1.0, high - 1.0] {
+                let (view, mut list) = (down(above_m), DrawList::default());
+                technique.select(&view, &mut list);
+                assert!(technique.limits().hold(&list.size()), "{name} {settings:?}, {above_m} m");
+                let proof =
+                    watertight::prove_list(&field, &view, technique.manner().seams, technique.resident(), &list);
+                proof.unwrap_or_else(|why| panic!("{name} {settings:?}, {above_m} m: {why}"));
+                scales.push(list.widening);
+            }
+            println!("{name} {settings:?}: {scales:?}");
+            assert!(scales.contains(&f64::INFINITY), "{name} {settings:?}: {scales:?}");
+        }
+    }
 }

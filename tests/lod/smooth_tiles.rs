@@ -205,6 +205,46 @@ fn one_chunk_a_frame_comes_to_the_same_land_as_all_at_once() {
     assert!(longest > 10, "something had to wait");
 }
 
+/// The list of a view once the technique has settled in it.
+fn settled_list(technique: &mut dyn Technique, view: &View) -> DrawList {
+    for frame in 1..5000 {
+        let mut list = DrawList::default();
+        technique.select(&View { time_s: view.time_s + f64::from(frame), ..*view }, &mut list);
+        if technique.is_settled() {
+            return list;
+        }
+    }
+    panic!("it never settles");
+}
+
+/// A view that the buffer cannot hold is drawn under a wider tolerance, which it keeps, and no tile waits for ever.
+#[test]
+fn a_full_buffer_widens_the_tolerance() {
+    let field = Arc::new(synth::synth(synth::Kind::Eroded, [257, 257], 5));
+    let (random, mut frames, mut widened) = (&mut Random(11), 0, 0);
+    for settings in [
+        ["morph=on", "clock=speed"],
+        ["morph=on", "clock=time"],
+        ["morph=on", "clock=frames"],
+        ["morph=off", "clock=speed"],
+    ] {
+        let settings = [&["tile=17", "memory=1"][..], &settings].concat();
+        let mut technique = technique(&field, "smooth-tiles", &settings);
+        for k in 0..100 {
+            let view = view(&field, random, 1e6 * f64::from(k));
+            let list = settled_list(&mut *technique, &view);
+            assert_eq!(list.waiting, 0, "{settings:?}, view {k}");
+            watertight::prove_list(&field, &view, technique.manner().seams, technique.resident(), &list).unwrap();
+            let max_px = geometric::errors(&field, &view, technique.resident(), &list).screen_px.max;
+            let px = view.tolerance.px * list.widening;
+            assert!(max_px <= px * (1.0 + 1e-9), "{settings:?}, view {k}: {max_px} px of {px}");
+            (frames, widened) = (frames + 1, widened + usize::from(list.widening > 1.0));
+        }
+    }
+    println!("{widened} of {frames} views under a wider tolerance");
+    assert!(widened > frames / 20 && widened < frames - frames / 20);
+}
+
 /// Frames of a way along which tiles only coarsen: the bound never hurries them.
 const COARSENING: u32 = 250;
 

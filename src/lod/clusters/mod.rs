@@ -43,7 +43,7 @@ use self::sight::Sight;
 use self::skirts::Skirts;
 use self::states::{MOST_SEEDS, Seeds};
 use self::tree::Tree;
-use super::{Entry, Setting, Settings, Technique, Values, Variant};
+use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, widened};
 use crate::draw::{
     Draw, DrawList, Driver, Geometry, Instance, Limits, Manner, Morph, Seams, Source, Submission, Topology,
 };
@@ -94,6 +94,8 @@ pub const ENTRY: Entry = Entry {
             about: "where blocks meet: on common edges, or with skirts under edges of their own, as published",
         },
     ],
+    // Vertices that morph by distance share their edges.
+    needs: &[Need { key: "seams", other: "morph", words: &["off", "on"] }],
     most_samples: u64::MAX,
     takes_endless: false,
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
@@ -172,23 +174,17 @@ impl Clusters {
         Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn }
     }
 
-    /// Refines the quadtree, with a wider tolerance if there would be too many blocks: by what factor.
+    /// Refines the quadtree, under a wider tolerance if there would be too many blocks, and returns its scale.
     fn collapse(&mut self, view: &View) -> f64 {
-        let mut wider = *view;
-        let mut drawn = std::mem::take(&mut self.drawn);
-        drawn.clear();
-        loop {
-            let sight = sight(&self.tree, self.morph, &wider);
-            if self.refinement.refine(&sight) {
-                let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-                let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement));
-                Collapse { sight: &sight, refinement, seeds, cells: self.cells, single, skirts }.run(&mut drawn);
-                break;
-            }
-            wider.tolerance.px = 1.5 * wider.tolerance.px.max(f64::MIN_POSITIVE);
-        }
-        self.drawn = drawn;
-        if wider.tolerance.px == view.tolerance.px { 1.0 } else { wider.tolerance.px / view.tolerance.px }
+        let (sight, tolerance_scale) = widened(view, |wider| {
+            let sight = sight(&self.tree, self.morph, wider);
+            self.refinement.refine(&sight).then_some(sight)
+        });
+        let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
+        let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement));
+        self.drawn.clear();
+        Collapse { sight: &sight, refinement, seeds, cells: self.cells, single, skirts }.run(&mut self.drawn);
+        tolerance_scale
     }
 
     /// A draw for each kind of cluster that occurs.

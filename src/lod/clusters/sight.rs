@@ -276,6 +276,8 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
     });
     let lean = view.forward().y.abs();
     let (metric, scale) = match (view.lens, view.tolerance.metric) {
+        // No tolerance is kept: every node is fine enough, in front of the eye too.
+        _ if view.tolerance.px == f64::INFINITY => (EVEN, 0.0),
         (Lens::Orthographic { .. }, Metric::Paper) => (EVEN, 1.0),
         (Lens::Orthographic { .. }, Metric::Certified) => (EVEN, (1.0 - lean * lean).max(0.0).sqrt()),
         (Lens::Perspective { .. }, Metric::Paper) => (PAPER, 1.0),

@@ -50,6 +50,10 @@ pub struct Ways {
 impl Ways {
     /// The ways in a view of a quadtree whose errors are those of whole levels.
     pub fn new(tree: &Tree, view: &View) -> Self {
+        if view.tolerance.px == f64::INFINITY {
+            // No tolerance is kept: the way into every level has ended, wherever the eye is.
+            return Self { ways: [FARTHEST_M as f32; WAYS], above_squared: FARTHEST_M as f32 };
+        }
         let [low, high] = tree.bounds.square(tree.root().level, [0, 0]).range.map(f64::from);
         let above = (view.eye.y - high).max(low - view.eye.y).clamp(0.0, FARTHEST_M);
         let diagonal = tree.spacing[0].hypot(tree.spacing[1]);

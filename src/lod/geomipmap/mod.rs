@@ -27,7 +27,7 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Setting, Settings, Spared, Technique, Values, Variant};
+use super::{Entry, Need, Setting, Settings, Spared, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Morph, Source, Submission, Topology, weights};
 use crate::height::Field;
 use crate::view::View;
@@ -74,6 +74,7 @@ pub const ENTRY: Entry = Entry {
             about: "whether a level goes over into the next, or changes at once",
         },
     ],
+    needs: &[Need { key: "base", other: "distance", words: &["linear", "exponential"] }],
     most_samples: 1 << 34,
     takes_endless: false,
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),

@@ -52,7 +52,8 @@ pub struct Step {
 
 impl Step {
     const NONE: Step = Step { levels: 0.0, way_m: 0.0 };
-    const AT_ONCE: Step = Step { levels: f64::INFINITY, way_m: 0.0 };
+    /// As far as they have to go.
+    pub const AT_ONCE: Step = Step { levels: f64::INFINITY, way_m: 0.0 };
 
     /// In a tile so far from the eye, in units of [`levels::ONE`].
     pub fn at(&self, distance_m: f64) -> u32 {

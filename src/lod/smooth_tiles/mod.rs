@@ -36,12 +36,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use self::clock::{Clock, Drive};
+use self::clock::{Clock, Drive, Step};
 use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Setting, Settings, Spared, Technique, Values};
+use super::{Entry, Need, Setting, Settings, Spared, Technique, Values, widened};
 use crate::draw::{
     Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
     VertexNormals, weights,
@@ -96,6 +96,7 @@ pub const ENTRY: Entry = Entry {
             about: "chunks on the device at most, MiB",
         },
     ],
+    needs: &[Need { key: "clock", other: "morph", words: &["on"] }],
     most_samples: 1 << 30,
     takes_endless: false,
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
@@ -223,9 +224,20 @@ impl SmoothTiles {
         levels::restrict(restricted, self.tiles.count);
     }
 
+    /// Finds how coarse tiles may be under the first tolerance at which the buffer holds them all, and returns its scale.
+    fn widen(&mut self, view: &View) -> f64 {
+        widened(view, |wider| {
+            self.find_ceilings(wider);
+            self.queue.holds(self.ceilings[1].iter().map(|level| level / ONE)).then_some(())
+        })
+        .1
+    }
+
     /// Moves levels on, as far as the clock and the bound say.
     fn move_levels(&mut self, view: &View) {
-        let step = self.clock.step(view);
+        let clock = self.clock.step(view);
+        // A full buffer has room only once tiles coarsen: they do at once.
+        let step = if self.queue.is_short() { Step::AT_ONCE } else { clock };
         let ceilings = &self.ceilings[1];
         for (tile, level) in self.levels.iter_mut().enumerate() {
             let distance_m = self.tiles.bounds(tile).distance(view.eye).max(self.side_m);
@@ -309,7 +321,7 @@ impl Technique for SmoothTiles {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.find_ceilings(view);
+        list.widening = self.widen(view);
         self.move_levels(view);
         self.find_visible(view);
         self.rebuild(view, &mut list.uploads);
@@ -329,7 +341,7 @@ impl Technique for SmoothTiles {
             let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
             self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
         };
-        self.queue.is_at_rest() && (is_still || (0..self.tiles.total()).all(stands))
+        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
     }
 
     fn keeps_tolerance(&self) -> bool {

@@ -37,6 +37,8 @@ pub struct Queue {
     left: Budget,
     moves: Vec<Move>,
     changed: Vec<usize>,
+    /// Whether a chunk of the last frame found no room in the buffer.
+    is_short: bool,
 }
 
 impl Queue {
@@ -49,13 +51,26 @@ impl Queue {
         };
         // All of the finest level that is used, twice, so that all may change in one frame; the coarsest at least.
         let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
-        let least = Pool::vertices_for(&sizes, &all_at(&[top])) + Pool::vertices_for(&sizes, &all_at(&[]));
+        let least = settled_vertices(&sizes, &all_at(&[top]));
         let mut pool = Pool::new(sizes, whole.min(most_vertices).max(least));
         let first_vertices =
             (0..count).map(|_| pool.take(top, 0).expect("the pool holds the coarsest level")).collect();
         let left = Budget { chunks: 0, vertices: 0 };
         let (levels, moves, changed) = (vec![top; count], Vec::new(), Vec::new());
-        Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed }
+        Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed, is_short: false }
+    }
+
+    /// Whether the buffer holds chunks of these levels, one a tile, with the pages that moves between them need.
+    pub fn holds(&self, levels: impl Iterator<Item = u32>) -> bool {
+        let sizes: Vec<_> = (0..=self.cells.ilog2()).map(|level| chunk::vertices(self.cells, level)).collect();
+        let mut chunks = vec![0; sizes.len()];
+        levels.for_each(|level| chunks[level as usize] += 1);
+        settled_vertices(&sizes, &chunks) <= self.vertices()
+    }
+
+    /// Whether a chunk of the last frame found no room in the buffer.
+    pub fn is_short(&self) -> bool {
+        self.is_short
     }
 
     /// Vertices that the buffer holds.
@@ -88,6 +103,7 @@ impl Queue {
         urgency: impl Fn(usize) -> U,
     ) -> &[Move] {
         self.left = budget;
+        self.is_short = false;
         self.moves.clear();
         let mut changed = std::mem::take(&mut self.changed);
         changed.clear();
@@ -163,11 +179,19 @@ impl Queue {
         if self.left.chunks == 0 || self.left.vertices < vertices {
             return false;
         }
-        let Some(first_vertex) = self.pool.take(level, spare) else { return false };
+        let Some(first_vertex) = self.pool.take(level, spare) else {
+            self.is_short = true;
+            return false;
+        };
         self.left = Budget { chunks: self.left.chunks - 1, vertices: self.left.vertices - vertices };
         self.pool.give(self.first_vertices[tile]);
         (self.levels[tile], self.first_vertices[tile]) = (level, first_vertex);
         self.moves.push(Move { tile, level, first_vertex });
         true
     }
+}
+
+/// Vertices of a buffer that holds so many chunks of each level, and the pages that refining leaves for what coarsens.
+fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
+    Pool::vertices_for(sizes, chunks) + Pool::vertices_for(sizes, &vec![0; sizes.len()])
 }

@@ -87,14 +87,14 @@ impl Errors {
 
     fn measured_land(&self, field: &Field, level: u32) -> Vec<bool> {
         let count = self.levels[level as usize - 1].count;
-        let is_land = |k: u32| {
-            let first = [k % count[0], k / count[0]].map(|n| (n as i32) << level);
+        let is_land = |at: [u32; 2]| {
+            let first = at.map(|n| (n as i32) << level);
             let last = [0, 1].map(|k| (first[k] + (1 << level)).min(self.last[k]));
             // Squares that may lie anywhere have land if the field has.
             let anywhere = count == [1, 1] && self.is_tiled != [false; 2];
             if anywhere { surface::has_land(field, [0; 2], self.last) } else { surface::has_land(field, first, last) }
         };
-        (0..count[0] * count[1]).into_par_iter().map(is_land).collect()
+        places(count).map(is_land).collect()
     }
 
     /// Whether any triangle of the samples' own surface has data in a square of the last level.
@@ -130,7 +130,7 @@ impl Errors {
         // Squares that may lie anywhere are one, along an axis that is not tiled too.
         let repeats = |k: usize| self.is_tiled[k] || count[k] == 1;
         let [x, z] = [0, 1].map(|k| if repeats(k) { at[k] as u32 % count[k] } else { at[k] as u32 });
-        (z * count[0] + x) as usize
+        z as usize * count[0] as usize + x as usize
     }
 
     /// Whether the end of a tiled field cuts a square, or the pair of it and the next, which were measured whole.
@@ -161,10 +161,7 @@ impl Errors {
 
     fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
         let Some(count) = self.count(field, level) else { return self.anything(field) };
-        let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
-            let at = [k % count[0], k / count[0]].map(|n| n as i32);
-            self.measured_square(field, level, at, patterns)
-        });
+        let squares = places(count).map(|at| self.measured_square(field, level, at.map(|n| n as i32), patterns));
         Level { count, squares: squares.collect() }
     }
 
@@ -198,7 +195,7 @@ impl Errors {
         let held = &self.levels[level as usize - 2];
         let child = |at: [i32; 2]| {
             let [x, z] = [0, 1].map(|k| at[k] as u32 % held.count[k]);
-            held.squares[(z * held.count[0] + x) as usize]
+            held.squares[z as usize * held.count[0] as usize + x as usize]
         };
         children.into_iter().filter(exists).map(child).fold(Square::NOTHING, Square::union)
     }
@@ -215,6 +212,12 @@ impl Errors {
         });
         if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(field, &corners) }
     }
+}
+
+/// The places of a level's squares, row by row.
+fn places([x_count, z_count]: [u32; 2]) -> impl IndexedParallelIterator<Item = [u32; 2]> {
+    let count = x_count as usize * z_count as usize;
+    (0..count).into_par_iter().map(move |k| [k % x_count as usize, k / x_count as usize].map(|n| n as u32))
 }
 
 /// The range of all heights between two positions if any sample there has data: it may be alone among holes.

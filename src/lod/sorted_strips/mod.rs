@@ -67,7 +67,7 @@ use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::{Radial, above_m};
 use self::walk::{Ground, Stream, Worker};
-use super::{Entry, Setting, Settings, Technique, Values, Variant, widened};
+use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, widened};
 use crate::draw::{Draw, DrawList, Draws, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
@@ -142,6 +142,12 @@ pub const ENTRY: Entry = Entry {
             default: "off",
             about: "how vertices of level=uniform go over into the next level: at once, up or down, or into an end of its edge",
         },
+    ],
+    needs: &[
+        Need { key: "parts", other: "level", words: &["certified"] },
+        Need { key: "guard", other: "level", words: &["certified"] },
+        Need { key: "edge", other: "level", words: &["uniform"] },
+        Need { key: "blend", other: "level", words: &["uniform"] },
     ],
     most_samples: u64::MAX,
     takes_endless: false,

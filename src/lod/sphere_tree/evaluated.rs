@@ -35,8 +35,8 @@ pub struct Size {
 /// Sizes of diamonds of a land.
 pub struct Evaluated {
     land: Arc<Bezier>,
-    /// What rounding of vertices to single precision may add to an error, relative to their heights.
-    rounding: f64,
+    /// What single precision may add to a vertex's height, relative to its distance from the eye.
+    pub rounding: f64,
     parts: Vec<RwLock<ByIndex<Size>>>,
 }
 
@@ -87,8 +87,9 @@ impl Evaluated {
         let place = at.map(|n| f64::from(n) * SPACING_M);
         let bounds = self.land.bounds(&Area::about(place, reach * half_m), longest_m);
         let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
-        let rounding_m = bounds.height_m[0].abs().max(bounds.height_m[1].abs()) * self.rounding;
         let ball = (steps_m + bounds.way_m) * (1.0 + SPARE);
+        // Corners are up to two balls further from the eye than what lies between them.
+        let rounding_m = 2.0 * ball * self.rounding;
         Size {
             height: self.land.height(place),
             error: ((bounds.deviation_m + rounding_m) as f32).next_up(),

@@ -18,6 +18,7 @@ use crate::height::Field;
 use crate::height::bounds::ROUNDING;
 use crate::height::progress::Progress;
 use crate::height::surface::{self, Corner};
+use crate::view::{Tolerance, View};
 
 /// What rounding may take from a ball, relative: far more than that of a distance in f64.
 pub const SPARE: f64 = 1e-6;
@@ -134,12 +135,12 @@ impl Measured {
 
     /// Height of a vertex, metres.
     #[inline]
-    pub fn height(&self, at: Place) -> f32 {
+    pub fn height(&self, at: Place) -> f64 {
         if let (Some(evaluated), Some(index)) = (&self.evaluated, self.lattice.index(at)) {
-            return evaluated.size(at, index).height as f32;
+            return evaluated.size(at, index).height;
         }
         let [x, z] = self.lattice.on_field(at);
-        self.field.height(x as u32, z as u32)
+        f64::from(self.field.height(x as u32, z as u32))
     }
 
     /// A vertex from the field's first sample on, metres.
@@ -176,6 +177,14 @@ impl Measured {
     #[inline]
     pub fn is_endless(&self) -> bool {
         self.evaluated.is_some()
+    }
+
+    /// The view with what rounding of vertices takes of its tolerance taken off; `None` if that is all of it.
+    pub fn without_rounding(&self, view: &View) -> Option<View> {
+        let (Some(evaluated), Some(land)) = (&self.evaluated, self.field.land()) else { return Some(*view) };
+        let [low, high] = land.range_m();
+        let px = view.tolerance.px - Reach::rounding_px(view, evaluated.rounding, high - low);
+        (px > 0.0).then_some(View { tolerance: Tolerance { px, ..view.tolerance }, ..*view })
     }
 
     /// Says which diamonds will be asked for.
@@ -247,7 +256,7 @@ mod tests {
             for apex in apexes.into_iter().filter(|&at| measured.lattice.contains(at)) {
                 let mut corners = [apex, ends[0], ends[1]].map(|at| {
                     let [x, z] = measured.lattice.on_field(at);
-                    Corner { x, z, y: measured.height(at) }
+                    Corner { x, z, y: measured.height(at) as f32 }
                 });
                 if surface::doubled_area(&corners) < 0 {
                     corners.swap(1, 2);

@@ -38,13 +38,14 @@ impl Corner {
         self.target + (1.0 - f64::from(self.weight)) * self.over
     }
 
-    /// As it is drawn.
-    pub fn vertex(&self, lattice: &Lattice) -> ExplicitVertex {
+    /// The vertex as it is drawn, its heights relative to `height_base` metres.
+    pub fn vertex(&self, lattice: &Lattice, height_base: f32) -> ExplicitVertex {
         let height = if self.over + self.target == self.height { self.height } else { self.target + self.over };
+        let relative = |height: f64| (height - f64::from(height_base)) as f32;
         ExplicitVertex {
             position: lattice.on_field(self.at),
-            height: height as f32,
-            target: self.target as f32,
+            height: relative(height),
+            target: relative(self.target),
             morph: self.weight,
             ..ExplicitVertex::default()
         }
@@ -117,7 +118,7 @@ impl Mesh<'_> {
     }
 
     fn sample(&self, at: Place) -> Corner {
-        let height = f64::from(self.measured.height(at));
+        let height = self.measured.height(at);
         Corner { at, height, target: height, over: 0.0, weight: 0.0 }
     }
 
@@ -194,7 +195,7 @@ impl Mesh<'_> {
                 let place = &mut table[z * row + x];
                 if *place == u32::MAX {
                     *place = piece.vertices.len() as u32;
-                    piece.vertices.push(corner.vertex(&self.measured.lattice));
+                    piece.vertices.push(corner.vertex(&self.measured.lattice, 0.0));
                 }
                 piece.indices.push(*place);
             }
@@ -207,7 +208,7 @@ impl Mesh<'_> {
         let mut piece = Piece::default();
         for corner in wedges.iter().filter(|wedge| self.has_area(wedge)).flatten() {
             piece.indices.push(piece.vertices.len() as u32);
-            piece.vertices.push(corner.vertex(&self.measured.lattice));
+            piece.vertices.push(corner.vertex(&self.measured.lattice, 0.0));
         }
         piece
     }

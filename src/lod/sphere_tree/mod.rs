@@ -92,6 +92,7 @@ pub const ENTRY: Entry = Entry {
             about: "whether all triangles are sent in each frame, or, of a land with samples, blocks that changed",
         },
     ],
+    needs: &[],
     most_samples: 1 << 27,
     takes_endless: true,
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
@@ -204,7 +205,7 @@ impl Technique for SphereTree {
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
         let (from, widening) = widened(view, |wider| {
-            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(wider));
+            let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&self.measured.without_rounding(wider)?));
             let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
             self.criterion.follow(&self.measured, &from, most_splits(&self.measured)).then_some(from)
         });

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::lattice::Place;
 use super::mesh::{Mesh, Piece, Wedge, push};
 use crate::draw::normals::pack;
-use crate::draw::{DrawList, VertexNormals};
+use crate::draw::{DrawList, ExplicitVertex, VertexNormals};
 use crate::height::bezier::{Bezier, SPACING_M};
 use crate::view::{Lens, View};
 
@@ -21,19 +21,24 @@ const SMOOTHED_PX: f64 = 6.0;
 impl Mesh<'_> {
     /// Fills an empty list: one draw.
     pub fn fill_open(&self, land: &Bezier, view: &View, list: &mut DrawList) {
+        // The height of the land nearest the eye's: no vertex is further from it than from the eye.
+        let [low, high] = land.range_m();
+        list.height_base = view.eye.y.clamp(low, high) as f32;
         let (mut piece, mut numbers) = (Piece::default(), HashMap::new());
         for wedge in self.roots() {
             self.walk(&wedge, view, &mut |wedge| {
                 for corner in wedge {
                     let number = *numbers.entry(corner.at).or_insert_with(|| {
-                        piece.vertices.push(corner.vertex(&self.measured.lattice));
+                        piece.vertices.push(corner.vertex(&self.measured.lattice, list.height_base));
                         piece.vertices.len() as u32 - 1
                     });
                     piece.indices.push(number);
                 }
             });
         }
-        let normal = |vertex: &crate::draw::ExplicitVertex| normal(land, view, vertex.position, vertex.height);
+        let height_base = f64::from(list.height_base);
+        let normal =
+            |vertex: &ExplicitVertex| normal(land, view, vertex.position, height_base + f64::from(vertex.height));
         list.streamed.normals = piece.vertices.par_iter().with_min_len(64).map(normal).collect();
         push(list, piece);
     }
@@ -60,10 +65,10 @@ impl Mesh<'_> {
     }
 }
 
-fn normal(land: &Bezier, view: &View, at: Place, height: f32) -> VertexNormals {
+fn normal(land: &Bezier, view: &View, at: Place, height: f64) -> VertexNormals {
     let [x, z] = at.map(|n| f64::from(n) * SPACING_M);
     let distance = match view.lens {
-        Lens::Perspective { .. } => view.eye.distance(DVec3::new(x, f64::from(height), z)),
+        Lens::Perspective { .. } => view.eye.distance(DVec3::new(x, height, z)),
         Lens::Orthographic { .. } => 1.0,
     };
     let [along_x, along_z] = land.slopes([x, z], SMOOTHED_PX * distance / view.focal_px());

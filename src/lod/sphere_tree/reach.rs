@@ -46,6 +46,15 @@ impl Reach {
         }
     }
 
+    /// The part of a view's tolerance, pixels, that single precision takes of heights relative to the eye's: an error of
+    /// `rounding` times the distance, in parallel projection of times `range_m`, the land's range of heights.
+    pub fn rounding_px(view: &View, rounding: f64, range_m: f64) -> f64 {
+        match view.lens {
+            Lens::Perspective { .. } => view.focal_px() * view.corner_ray().powi(2) * rounding,
+            Lens::Orthographic { .. } => view.focal_px() * range_m * rounding,
+        }
+    }
+
     /// Whether a diamond of this error has a sphere. If it has none, its children have none.
     #[inline]
     pub fn matters(&self, error: f32) -> bool {
