@@ -34,7 +34,8 @@ fn a_working_set_is_drawn() {
     let picture = image::open(folder.path().join("set.png")).expect("a picture").into_rgb8();
     let colours: std::collections::HashSet<_> = picture.pixels().map(|pixel| pixel.0).collect();
     assert!(colours.len() > 4, "a node's level has a colour: {}", colours.len());
-    assert!(needed["nodes"].as_u64() > Some(50) && needed["texels_a_pixel"].as_f64() < Some(4.0), "{needed}");
+    // A node's texture has 64 × 64 texels, as on the device, of which a wedge may need few.
+    assert!(needed["nodes"].as_u64() > Some(50) && needed["texels_a_pixel"].as_f64() < Some(7.0), "{needed}");
     assert_eq!(needed["texel_px"], 1.0, "{needed}");
     // As on the device, texels are longer where the memory does not hold them.
     let few = [&["info", "demo", "--working-set", "set.png", "--texture-memory", "2"][..], &view].concat();

@@ -145,9 +145,10 @@ mod tests {
                 let at = random_place(&mut dice, level);
                 let size = evaluated.size(at, lattice.index(at).expect("a diamond"));
                 let Diamond { ends, apexes } = Diamond::around(at);
+                // Heights are relative to an eye beside the diamond.
                 let drawn = [apexes[0], ends[0], ends[1]].map(|p| {
                     let plan = p.map(|n| f64::from(n) * SPACING_M);
-                    [plan[0], plan[1], f64::from(land.height(plan) as f32)]
+                    [plan[0], plan[1], size.height + f64::from((land.height(plan) - size.height) as f32)]
                 });
                 for _ in 0..100 {
                     let (mut u, mut v) = (dice.f64(), dice.f64());
