@@ -4,7 +4,13 @@
 //! corner too, are drawn within one level of each other. That is the Lipschitz condition of Finch & Bishop's level
 //! function (§4.5), and [`Splits::close`] repairs a set that breaks it by splitting more.
 
+use std::collections::HashMap;
+
 use super::pages::{Grid, Pages};
+
+/// Words of a page that are held side by side, at most: 4 MiB, for pages of 4096 samples a side. Of larger pages, which only
+/// fields of millions of samples a side have, the words that are not 0 are held.
+const MAX_PAGE_WORDS: usize = 1 << 19;
 
 /// What strips ask of a level function.
 pub trait Levels: Sync {
@@ -25,6 +31,8 @@ pub struct Splits {
     /// By page: where its bits begin in `words`, and one; 0 if none of them is set.
     places: Vec<u32>,
     words: Vec<u64>,
+    /// By page and word, in place of `words` where pages are large.
+    sparse: HashMap<(u32, usize), u64>,
     words_per_page: usize,
     /// By level: the first bit in a page.
     first_bits: Vec<usize>,
@@ -42,7 +50,8 @@ impl Splits {
         let words_per_page = (first_bits.get(1).copied().unwrap_or(0) + bits(1)).div_ceil(64);
         let pages = (grid.count[0] * grid.count[1]) as usize;
         let lists = vec![Vec::new(); grid.level as usize + 1];
-        Self { grid, places: vec![0; pages], words: Vec::new(), words_per_page, first_bits, lists }
+        let (places, words, sparse) = (vec![0; pages], Vec::new(), HashMap::new());
+        Self { grid, places, words, sparse, words_per_page, first_bits, lists }
     }
 
     /// Empties the set and keeps its memory.
@@ -55,6 +64,7 @@ impl Splits {
             }
         }
         self.words.clear();
+        self.sparse.clear();
     }
 
     /// How many squares are split.
@@ -75,12 +85,17 @@ impl Splits {
     pub fn insert(&mut self, pages: &Pages, level: u32, at: [i32; 2]) -> bool {
         let page = at.map(|n| n >> (self.grid.level - level));
         let Some(k) = self.grid.index(page).filter(|_| pages.is_drawn(page)) else { return false };
-        if self.places[k] == 0 {
-            self.places[k] = (self.words.len() / self.words_per_page) as u32 + 1;
-            self.words.resize(self.words.len() + self.words_per_page, 0);
-        }
         let (word, bit) = self.bit(level, at);
-        let word = &mut self.words[(self.places[k] as usize - 1) * self.words_per_page + word];
+        let word = if self.words_per_page > MAX_PAGE_WORDS {
+            self.places[k] = k as u32 + 1;
+            self.sparse.entry((self.places[k], word)).or_default()
+        } else {
+            if self.places[k] == 0 {
+                self.places[k] = (self.words.len() / self.words_per_page) as u32 + 1;
+                self.words.resize(self.words.len() + self.words_per_page, 0);
+            }
+            &mut self.words[(self.places[k] as usize - 1) * self.words_per_page + word]
+        };
         if *word & bit != 0 {
             return false;
         }
@@ -112,7 +127,12 @@ impl Levels for Splits {
             return false;
         }
         let (word, bit) = self.bit(level, at);
-        self.words[(self.places[k] as usize - 1) * self.words_per_page + word] & bit != 0
+        let word = if self.words_per_page > MAX_PAGE_WORDS {
+            self.sparse.get(&(self.places[k], word)).copied().unwrap_or(0)
+        } else {
+            self.words[(self.places[k] as usize - 1) * self.words_per_page + word]
+        };
+        word & bit != 0
     }
 }
 
