@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::{Entry, Settings, Technique};
 use crate::draw::{Draw, DrawList, Geometry, Instance, LatticeVertex, Limits, Source, Topology};
 use crate::height::surface::has_land;
-use crate::height::{Field, rtin};
+use crate::height::{Field, MAX_SIDE, rtin};
 use crate::view::View;
 
 /// The row of the table.
@@ -20,6 +20,7 @@ pub const ENTRY: Entry = Entry {
     settings: &[],
     needs: &[],
     most_samples: 1 << 32,
+    max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),
 };

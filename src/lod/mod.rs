@@ -121,6 +121,8 @@ pub struct Entry {
     pub needs: &'static [Need],
     /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
     pub most_samples: u64,
+    /// The most samples along a side of a field, tiling included.
+    pub max_side: u32,
     /// Whether it takes a land without samples ([`Field::land`]).
     pub takes_endless: bool,
     /// Prepares the technique for a field of at most so many.
@@ -138,6 +140,9 @@ impl Entry {
         }
         if field.land().is_none() && w * h > self.most_samples {
             return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
+        }
+        if field.land().is_none() && field.size().iter().any(|&n| n > self.max_side) {
+            return Err(format!("{name}: {w} x {h} samples: expected at most {} a side", self.max_side));
         }
         if field.ceiling().is_some() {
             sorted_strips::cave::can_draw(self.name, settings)?;

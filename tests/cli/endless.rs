@@ -39,8 +39,9 @@ fn a_working_set_is_drawn() {
     assert_eq!(needed["texel_px"], 1.0, "{needed}");
     // As on the device, texels are longer where the memory does not hold them.
     let few = [&["info", "demo", "--working-set", "set.png", "--texture-memory", "2"][..], &view].concat();
+    let few: Vec<_> = few.into_iter().map(|word| if word == "320x200" { "1600x1000" } else { word }).collect();
     let few = json(folder.path(), &few);
-    assert!(few["nodes"].as_u64() <= few["slots"].as_u64() && few["nodes"].as_u64() < needed["nodes"].as_u64());
+    assert!(few["nodes"].as_u64() <= few["slots"].as_u64(), "{few}");
     assert!(few["texel_px"].as_f64() > Some(1.0) && few["bytes"].as_u64() < Some(2_000_000), "{few}");
     refused(folder.path(), &["info", "demo", "--working-set", "set.txt"], &["set.txt", ".png"]);
 }

@@ -47,8 +47,8 @@ use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, widened}
 use crate::draw::{
     Draw, DrawList, Driver, Geometry, Instance, Limits, Manner, Morph, Seams, Source, Submission, Topology,
 };
-use crate::height::Field;
 use crate::height::bounds::Measure;
+use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
 /// Blocks that morph begin to leave their level where the allowed error reaches their parent's, and have left it at
@@ -97,6 +97,7 @@ pub const ENTRY: Entry = Entry {
     // Vertices that morph by distance share their edges.
     needs: &[Need { key: "seams", other: "morph", words: &["off", "on"] }],
     most_samples: u64::MAX,
+    max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };

@@ -29,7 +29,7 @@ use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
 use super::{Entry, Need, Setting, Settings, Spared, Technique, Values, Variant};
 use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Morph, Source, Submission, Topology, weights};
-use crate::height::Field;
+use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
 /// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
@@ -76,6 +76,7 @@ pub const ENTRY: Entry = Entry {
     ],
     needs: &[Need { key: "base", other: "distance", words: &["linear", "exponential"] }],
     most_samples: 1 << 34,
+    max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
 };

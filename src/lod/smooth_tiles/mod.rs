@@ -46,7 +46,7 @@ use crate::draw::{
     Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
     VertexNormals, weights,
 };
-use crate::height::Field;
+use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
 /// The most bytes uploaded in a frame: a staging buffer of this size is made for each frame in flight.
@@ -98,6 +98,7 @@ pub const ENTRY: Entry = Entry {
     ],
     needs: &[Need { key: "clock", other: "morph", words: &["on"] }],
     most_samples: 1 << 30,
+    max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
 };

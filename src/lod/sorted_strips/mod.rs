@@ -150,6 +150,8 @@ pub const ENTRY: Entry = Entry {
         Need { key: "blend", other: "level", words: &["uniform"] },
     ],
     most_samples: u64::MAX,
+    // The walk has a mark for each sample along a row of pages.
+    max_side: 1 << 22,
     takes_endless: false,
     build: |field, settings| match Cave::of(&field) {
         Some(cave) => Box::new(CaveStrips::new(Arc::new(cave), settings)),

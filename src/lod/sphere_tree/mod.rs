@@ -48,7 +48,7 @@ use self::shells::Shells;
 use self::splits::{Changes, Found, Splits};
 use super::{Entry, Setting, Settings, Technique, Values, widened};
 use crate::draw::{DrawList, Draws, Geometry, Limits, Manner, Normals};
-use crate::height::Field;
+use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
 /// Vertices fade in over so many times a sphere's radius: a wider band draws more, a narrower one is seen.
@@ -94,6 +94,7 @@ pub const ENTRY: Entry = Entry {
     ],
     needs: &[],
     most_samples: 1 << 27,
+    max_side: MAX_SIDE,
     takes_endless: true,
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
 };
