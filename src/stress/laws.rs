@@ -26,6 +26,8 @@ pub struct Subject<'a> {
     pub technique: &'a mut dyn Technique,
     /// Views and their names.
     pub views: &'a [(&'static str, View)],
+    /// Tolerances, pixels, widest last, for what is compared between them.
+    pub tolerances_px: &'a [f64],
     /// The scene's time, seconds: it goes on from list to list.
     pub time_s: f64,
 }
@@ -90,8 +92,8 @@ pub const LAWS: &[Law] = &[
     },
 ];
 
-/// Tolerances, pixels, widest last.
-const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
+/// Tolerances that suit any field, pixels, widest last.
+pub const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 
 /// What rounding may add to a screen error, relative. Heights are compared as the f32 they are drawn with and
 /// everything else is f64, whose rounding over a projection stays far below this.
@@ -188,7 +190,7 @@ fn error_within_tolerance(subject: &mut Subject) -> Result<(), Broken> {
     }
     subject.in_every_view(|subject, view| {
         let mut last = None;
-        TOLERANCES_PX.iter().try_for_each(|&px| {
+        subject.tolerances_px.iter().try_for_each(|&px| {
             let view = views::with_tolerance(view, px);
             let list = subject.select(&view)?;
             if last.as_ref().is_some_and(|last| same_list(last, &list)) {
@@ -272,9 +274,10 @@ fn in_range(geometry: &Geometry, draw: &Draw) -> bool {
 }
 
 fn wider_never_more(subject: &mut Subject) -> Result<(), Broken> {
+    let tolerances_px = subject.tolerances_px;
     subject.in_every_view(|subject, view| {
         let count = |px| subject.select(&views::with_tolerance(view, px)).map(|list| list.triangles());
-        let counts = TOLERANCES_PX.into_iter().map(count).collect::<Result<Vec<_>, _>>()?;
+        let counts = tolerances_px.iter().copied().map(count).collect::<Result<Vec<_>, _>>()?;
         ensure(counts.is_sorted_by(|a, b| a >= b), || format!("triangles by tolerance: {counts:?}"))
     })
 }

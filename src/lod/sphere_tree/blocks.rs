@@ -1,7 +1,8 @@
 //! Squares of the field with the ranges of their heights: what is in sight is told by them.
 //!
 //! They are the same at every tolerance, so that a wider one never draws more. A wedge larger than a block is drawn if
-//! it covers any block in sight.
+//! it covers any block in sight. One that sticks out of the field is never larger, unless it collapses
+//! ([`Lattice::always_splits`]).
 
 use rayon::prelude::*;
 
@@ -9,11 +10,6 @@ use super::lattice::{Lattice, Place};
 use crate::height::Field;
 use crate::height::surface::has_land;
 use crate::view::{Aabb, Containment, View};
-
-/// The most blocks along an axis: each may take a draw.
-const MOST_ALONG: i32 = 32;
-/// The smallest side of a block, cells.
-const LEAST_SIDE: i32 = 32;
 
 /// The blocks of a field.
 pub struct Blocks {
@@ -34,7 +30,7 @@ impl Blocks {
             // Wedges tell themselves whether they are in sight.
             return Self { side: lattice.side(), count: [0; 2], bounds: Vec::new(), seen: Vec::new() };
         }
-        let side = (lattice.side() / MOST_ALONG).max(LEAST_SIDE).min(lattice.side());
+        let side = lattice.block_side();
         let last = field.size().map(|n| n as i32 - 1);
         let count = last.map(|n| (n - 1) / side + 1);
         let of_block = |k: i32| bounds(field, last, side, [k % count[0], k / count[0]]);

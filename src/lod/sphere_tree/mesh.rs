@@ -214,8 +214,7 @@ impl Mesh<'_> {
 
     /// Whether a wedge does not collapse onto the field's edge.
     fn has_area(&self, wedge: &Wedge) -> bool {
-        let [[ax, az], [bx, bz], [cx, cz]] = wedge.map(|corner| self.measured.lattice.on_field(corner.at));
-        i64::from(bz - az) * i64::from(cx - ax) != i64::from(bx - ax) * i64::from(cz - az)
+        !self.measured.lattice.collapses(wedge.map(|corner| corner.at))
     }
 }
 
