@@ -127,8 +127,14 @@ impl Subject<'_> {
 
     /// The triangles of a view, and how many fraction bits their corners have.
     fn drawn(&mut self, view: &View) -> Result<(Vec<Drawn>, u32), String> {
-        let (list, frame) = (self.select(view)?, Frame::placing(self.field, view));
-        Ok((expand::triangles(self.field, &frame, self.technique.resident(), &list), list.fraction_bits))
+        let list = self.select(view)?;
+        Ok((self.expanded(view, &list), list.fraction_bits))
+    }
+
+    /// The triangles of a list.
+    fn expanded(&self, view: &View, list: &DrawList) -> Vec<Drawn> {
+        let frame = Frame::placing(self.field, view);
+        expand::triangles(self.field, &frame, self.technique.resident(), list)
     }
 
     /// Runs a check in every view and names the view that breaks it.
@@ -149,24 +155,30 @@ fn one_surface(subject: &mut Subject) -> Result<(), Broken> {
             let seams = subject.technique.manner().seams;
             let proof = watertight::prove_list(subject.field, view, seams, subject.technique.resident(), &list)
                 .map_err(|why| why.to_string())?;
+            let all_land = all_land && list.reach_m == f64::INFINITY;
             ensure(!all_land || proof.doubled_area == whole, || format!("area {} of {whole}", proof.doubled_area))
         })
     })
 }
 
-/// Every sample in the picture lies in a drawn triangle: the prover's last step another way, by exact
+/// Every sample in the picture, as far as the list reaches, lies in a drawn triangle: the prover's last step another way, by exact
 /// projection instead of boxes, and by points instead of areas.
 fn everything_in_sight(subject: &mut Subject) -> Result<(), Broken> {
     let land = samples_of_land(subject.field);
     subject.in_every_view(|subject, view| {
         let [w, h] = subject.field.size();
         let mut covered = vec![false; (w * h) as usize];
-        let (triangles, bits) = subject.drawn(view)?;
+        let list = subject.select(view)?;
+        let triangles = subject.expanded(view, &list);
         for triangle in triangles.iter().filter(|t| surface::doubled_area(&t.corners) > 0) {
             let cover = |x, z, _| covered[(z * w + x) as usize] = true;
-            surface::visit_samples_between(&triangle.corners, bits, cover);
+            surface::visit_samples_between(&triangle.corners, list.fraction_bits, cover);
         }
-        let open = |&k: &u32| !covered[k as usize] && in_view(view, subject.field.world(k % w, k / w));
+        let is_seen = |point: DVec3| {
+            let within_reach = (point.x - view.eye.x).hypot(point.z - view.eye.z) <= list.reach_m;
+            within_reach && in_view(view, point)
+        };
+        let open = |&k: &u32| !covered[k as usize] && is_seen(subject.field.world(k % w, k / w));
         let missing = land.iter().find(|&k| open(k));
         missing.map_or(Ok(()), |k| Err(format!("sample ({}, {}) is in view and not drawn", k % w, k / w)))
     })
