@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::fields::hills;
 use super::forms::Form;
-use super::laws::{Broken, Subject};
+use super::laws::{Broken, Subject, TOLERANCES_PX};
 use super::{Case, Finding, Kind, views};
 use crate::draw::DrawList;
 
@@ -51,7 +51,8 @@ fn fine_steps(form: &Form) -> Vec<Finding> {
     let field = hills([129, 97], [10.0; 2], 400.0);
     let mut technique = (form.entry.build)(Arc::new(field.clone()), &form.settings);
     let named = views::views(&field).swap_remove(2);
-    let mut subject = Subject { field: &field, technique: &mut *technique, views: &[], time_s: 0.0 };
+    let mut subject =
+        Subject { field: &field, technique: &mut *technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
     let mut before = u64::MAX;
     let mut worst: (f64, Option<Broken>) = (0.0, None);
     for px in (0..STEPS).map(|k| 0.125 * 1.01f64.powi(k)) {

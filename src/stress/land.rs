@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Finding;
 use super::forms::Form;
-use super::laws::{Broken, LAWS, SLACK, Subject};
+use super::laws::{Broken, LAWS, SLACK, Subject, TOLERANCES_PX};
 use crate::draw::distance::is_by_distance;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -29,7 +29,13 @@ pub fn examine(land: &Land, form: &Form) -> Vec<Finding> {
         Ok(technique) => technique,
         Err(why) => return vec![Finding::told("refused, saying why", 1.0).because(Some(why))],
     };
-    let mut subject = Subject { field: &land.field, technique: &mut *technique, views: &land.views, time_s: 0.0 };
+    let mut subject = Subject {
+        field: &land.field,
+        technique: &mut *technique,
+        views: &land.views,
+        tolerances_px: &TOLERANCES_PX,
+        time_s: 0.0,
+    };
     let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
     let mut findings: Vec<_> = laws.map(|law| Finding::holds(law.name, (law.check)(&mut subject))).collect();
     findings.extend(in_numbers(&mut subject));

@@ -26,6 +26,8 @@ pub struct Subject<'a> {
     pub technique: &'a mut dyn Technique,
     /// Views and their names.
     pub views: &'a [(&'static str, View)],
+    /// Tolerances, pixels, widest last, for what is compared between them.
+    pub tolerances_px: &'a [f64],
     /// The scene's time, seconds: it goes on from list to list.
     pub time_s: f64,
 }
@@ -90,8 +92,8 @@ pub const LAWS: &[Law] = &[
     },
 ];
 
-/// Tolerances, pixels, widest last.
-const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
+/// Tolerances that suit any field, pixels, widest last.
+pub const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 
 /// What rounding may add to a screen error, relative. Heights are compared as the f32 they are drawn with and
 /// everything else is f64, whose rounding over a projection stays far below this.
@@ -125,8 +127,14 @@ impl Subject<'_> {
 
     /// The triangles of a view, and how many fraction bits their corners have.
     fn drawn(&mut self, view: &View) -> Result<(Vec<Drawn>, u32), String> {
-        let (list, frame) = (self.select(view)?, Frame::placing(self.field, view));
-        Ok((expand::triangles(self.field, &frame, self.technique.resident(), &list), list.fraction_bits))
+        let list = self.select(view)?;
+        Ok((self.expanded(view, &list), list.fraction_bits))
+    }
+
+    /// The triangles of a list.
+    fn expanded(&self, view: &View, list: &DrawList) -> Vec<Drawn> {
+        let frame = Frame::placing(self.field, view);
+        expand::triangles(self.field, &frame, self.technique.resident(), list)
     }
 
     /// Runs a check in every view and names the view that breaks it.
@@ -147,24 +155,30 @@ fn one_surface(subject: &mut Subject) -> Result<(), Broken> {
             let seams = subject.technique.manner().seams;
             let proof = watertight::prove_list(subject.field, view, seams, subject.technique.resident(), &list)
                 .map_err(|why| why.to_string())?;
+            let all_land = all_land && list.reach_m == f64::INFINITY;
             ensure(!all_land || proof.doubled_area == whole, || format!("area {} of {whole}", proof.doubled_area))
         })
     })
 }
 
-/// Every sample in the picture lies in a drawn triangle: the prover's last step another way, by exact
+/// Every sample in the picture, as far as the list reaches, lies in a drawn triangle: the prover's last step another way, by exact
 /// projection instead of boxes, and by points instead of areas.
 fn everything_in_sight(subject: &mut Subject) -> Result<(), Broken> {
     let land = samples_of_land(subject.field);
     subject.in_every_view(|subject, view| {
         let [w, h] = subject.field.size();
         let mut covered = vec![false; (w * h) as usize];
-        let (triangles, bits) = subject.drawn(view)?;
+        let list = subject.select(view)?;
+        let triangles = subject.expanded(view, &list);
         for triangle in triangles.iter().filter(|t| surface::doubled_area(&t.corners) > 0) {
             let cover = |x, z, _| covered[(z * w + x) as usize] = true;
-            surface::visit_samples_between(&triangle.corners, bits, cover);
+            surface::visit_samples_between(&triangle.corners, list.fraction_bits, cover);
         }
-        let open = |&k: &u32| !covered[k as usize] && in_view(view, subject.field.world(k % w, k / w));
+        let is_seen = |point: DVec3| {
+            let within_reach = (point.x - view.eye.x).hypot(point.z - view.eye.z) <= list.reach_m;
+            within_reach && in_view(view, point)
+        };
+        let open = |&k: &u32| !covered[k as usize] && is_seen(subject.field.world(k % w, k / w));
         let missing = land.iter().find(|&k| open(k));
         missing.map_or(Ok(()), |k| Err(format!("sample ({}, {}) is in view and not drawn", k % w, k / w)))
     })
@@ -188,7 +202,7 @@ fn error_within_tolerance(subject: &mut Subject) -> Result<(), Broken> {
     }
     subject.in_every_view(|subject, view| {
         let mut last = None;
-        TOLERANCES_PX.iter().try_for_each(|&px| {
+        subject.tolerances_px.iter().try_for_each(|&px| {
             let view = views::with_tolerance(view, px);
             let list = subject.select(&view)?;
             if last.as_ref().is_some_and(|last| same_list(last, &list)) {
@@ -272,9 +286,10 @@ fn in_range(geometry: &Geometry, draw: &Draw) -> bool {
 }
 
 fn wider_never_more(subject: &mut Subject) -> Result<(), Broken> {
+    let tolerances_px = subject.tolerances_px;
     subject.in_every_view(|subject, view| {
         let count = |px| subject.select(&views::with_tolerance(view, px)).map(|list| list.triangles());
-        let counts = TOLERANCES_PX.into_iter().map(count).collect::<Result<Vec<_>, _>>()?;
+        let counts = tolerances_px.iter().copied().map(count).collect::<Result<Vec<_>, _>>()?;
         ensure(counts.is_sorted_by(|a, b| a >= b), || format!("triangles by tolerance: {counts:?}"))
     })
 }

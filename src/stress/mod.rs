@@ -18,12 +18,14 @@ mod position;
 pub mod rows;
 pub mod saved;
 pub mod stiff;
+pub mod sweep;
 mod time;
 pub mod views;
 
 #[cfg(feature = "vulkan")]
 pub mod device;
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -96,7 +98,7 @@ pub enum Kind {
 
 /// A row of the battery.
 pub struct Case {
-    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff` or `file`.
+    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: &'static str,
     /// Its name.
     pub name: &'static str,
@@ -105,8 +107,16 @@ pub struct Case {
 }
 
 /// The battery, family by family.
-pub const FAMILIES: &[&[Case]] =
-    &[fields::CASES, position::CASES, views::CASES, time::CASES, arithmetic::CASES, stiff::CASES, file::CASES];
+pub const FAMILIES: &[&[Case]] = &[
+    fields::CASES,
+    position::CASES,
+    views::CASES,
+    time::CASES,
+    arithmetic::CASES,
+    stiff::CASES,
+    file::CASES,
+    sweep::CASES,
+];
 
 /// All cases.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
@@ -160,12 +170,14 @@ impl Trial {
             (Kind::Alone(_, examine), _) => examine(),
             (_, None) => Vec::new(),
         }));
-        findings.unwrap_or_else(|panic| {
-            let said = panic.downcast_ref::<String>().cloned();
-            let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
-            vec![Finding::within("panics", 1.0, 0.0).because(said)]
-        })
+        findings.unwrap_or_else(|panic| vec![Finding::within("panics", 1.0, 0.0).because(Some(panic_text(&*panic)))])
     }
+}
+
+/// The text of a panic.
+fn panic_text(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
 }
 
 /// The trials of some cases with some techniques: in flights and on their own, the forms of every word.

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::fields::hills;
 use super::forms::Form;
-use super::laws::{LAWS, Subject};
+use super::laws::{LAWS, Subject, TOLERANCES_PX};
 use super::{Case, Finding, Kind, Land};
 use crate::height::Field;
 use crate::lod::Technique;
@@ -59,7 +59,13 @@ fn on_a_threshold(form: &Form) -> Vec<Finding> {
         return vec![Finding::told("every list is the same", 1.0)];
     };
     let views = [("just before", sides[0]), ("just behind", sides[1])];
-    let mut subject = Subject { field: &field, technique: &mut *technique, views: &views, time_s: 0.0 };
+    let mut subject = Subject {
+        field: &field,
+        technique: &mut *technique,
+        views: &views,
+        tolerances_px: &TOLERANCES_PX,
+        time_s: 0.0,
+    };
     let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
     laws.map(|law| Finding::holds(law.name, (law.check)(&mut subject))).collect()
 }
@@ -67,7 +73,7 @@ fn on_a_threshold(form: &Form) -> Vec<Finding> {
 /// The view and its eye moved towards `end`, halved until nothing lies between two that draw differently many triangles;
 /// `None` if both ends draw as many.
 pub fn threshold(field: &Field, technique: &mut dyn Technique, view: View, end: DVec3) -> Option<[View; 2]> {
-    let mut subject = Subject { field, technique, views: &[], time_s: 0.0 };
+    let mut subject = Subject { field, technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
     let way = end - view.eye;
     let at = |share: f64| View { eye: view.eye + way * share, ..view };
     let mut triangles = |share: f64| subject.select(&at(share)).map(|list| list.triangles()).ok();

@@ -13,7 +13,7 @@ use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::view::{Lens, View};
 
-use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::laws::{LAWS, Subject, TOLERANCES_PX};
 use cuesta::stress::views;
 
 use super::cases;
@@ -77,7 +77,8 @@ fn every_law_fails_on_what_breaks_it() {
         let Some((_, field)) = fields.iter().find(|(name, _)| name == field) else { continue };
         let views = views::views(field);
         let mut technique = build(field);
-        let mut subject = Subject { field, technique: &mut *technique, views: &views, time_s: 0.0 };
+        let mut subject =
+            Subject { field, technique: &mut *technique, views: &views, tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
         let law = LAWS.iter().find(|l| l.name == *law).expect("a law of the table");
         match (law.check)(&mut subject) {
             Ok(()) => panic!("{}: not broken by {breaker}", law.name),
@@ -102,7 +103,13 @@ fn unbroken_it_keeps_the_laws() {
         Blocks::boxed(field, true, &[0, 1]),
     ];
     for mut technique in whole {
-        let mut subject = Subject { field, technique: &mut *technique, views: &views::views(field), time_s: 0.0 };
+        let mut subject = Subject {
+            field,
+            technique: &mut *technique,
+            views: &views::views(field),
+            tolerances_px: &TOLERANCES_PX,
+            time_s: 0.0,
+        };
         // Clusters have blocks of several levels.
         let has_levels = subject.technique.manner().seams == Seams::Shared;
         for law in LAWS.iter().filter(|law| has_levels || law.name != "neighbours within one level") {

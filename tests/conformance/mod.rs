@@ -4,11 +4,12 @@
 
 mod broken;
 pub(crate) mod cases;
+mod sweep;
 
 use std::sync::Arc;
 
 use cuesta::lod::TECHNIQUES;
-use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::laws::{LAWS, Subject, TOLERANCES_PX};
 use cuesta::stress::views;
 use rayon::prelude::*;
 
@@ -24,7 +25,13 @@ fn every_technique_keeps_every_law() {
         .flat_map_iter(|&((field_name, field), form)| {
             let views = views::views(field);
             let mut technique = (form.entry.build)(Arc::clone(field), &form.settings);
-            let mut subject = Subject { field, technique: &mut *technique, views: &views, time_s: 0.0 };
+            let mut subject = Subject {
+                field,
+                technique: &mut *technique,
+                views: &views,
+                tolerances_px: &TOLERANCES_PX,
+                time_s: 0.0,
+            };
             let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
             let failed = laws.filter_map(move |law| Some((law.name, (law.check)(&mut subject).err()?)));
             failed.map(|(law, why)| format!("{law}: {} on {field_name}: {why}", form.name)).collect::<Vec<_>>()

@@ -1,7 +1,10 @@
 //! Squares of the field with the ranges of their heights: what is in sight is told by them.
 //!
 //! They are the same at every tolerance, so that a wider one never draws more. A wedge larger than a block is drawn if
-//! it covers any block in sight.
+//! it covers any block in sight. Where vertices collapse onto the field's edge, a wedge covers other blocks than its halves
+//! do. All of these lie in one square ([`Lattice::edge_side`]), whose blocks are culled together.
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
@@ -9,11 +12,6 @@ use super::lattice::{Lattice, Place};
 use crate::height::Field;
 use crate::height::surface::has_land;
 use crate::view::{Aabb, Containment, View};
-
-/// The most blocks along an axis: each may take a draw.
-const MOST_ALONG: i32 = 32;
-/// The smallest side of a block, cells.
-const LEAST_SIDE: i32 = 32;
 
 /// The blocks of a field.
 pub struct Blocks {
@@ -25,6 +23,8 @@ pub struct Blocks {
     bounds: Vec<Option<Aabb>>,
     /// By block: whether it may be in sight.
     seen: Vec<bool>,
+    /// By square that the field's edge crosses: its blocks.
+    edge_squares: Vec<Vec<usize>>,
 }
 
 impl Blocks {
@@ -32,14 +32,21 @@ impl Blocks {
     pub fn new(field: &Field, lattice: &Lattice) -> Self {
         if field.land().is_some() {
             // Wedges tell themselves whether they are in sight.
-            return Self { side: lattice.side(), count: [0; 2], bounds: Vec::new(), seen: Vec::new() };
+            return Self {
+                side: lattice.side(),
+                count: [0; 2],
+                bounds: Vec::new(),
+                seen: Vec::new(),
+                edge_squares: Vec::new(),
+            };
         }
-        let side = (lattice.side() / MOST_ALONG).max(LEAST_SIDE).min(lattice.side());
+        let side = lattice.block_side();
         let last = field.size().map(|n| n as i32 - 1);
         let count = last.map(|n| (n - 1) / side + 1);
         let of_block = |k: i32| bounds(field, last, side, [k % count[0], k / count[0]]);
         let bounds: Vec<_> = (0..count[0] * count[1]).into_par_iter().map(of_block).collect();
-        Self { side, count, seen: vec![false; bounds.len()], bounds }
+        let edge_squares = edge_squares(count, last, side, lattice.edge_side());
+        Self { side, count, seen: vec![false; bounds.len()], bounds, edge_squares }
     }
 
     /// Finds the blocks in sight.
@@ -47,6 +54,10 @@ impl Blocks {
         let frustum = view.frustum();
         for (seen, bounds) in self.seen.iter_mut().zip(&self.bounds) {
             *seen = bounds.as_ref().is_some_and(|bounds| frustum.contains(bounds) != Containment::Outside);
+        }
+        for blocks in &self.edge_squares {
+            let is_seen = blocks.iter().any(|&block| self.seen[block]);
+            blocks.iter().for_each(|&block| self.seen[block] = is_seen);
         }
     }
 
@@ -72,6 +83,18 @@ impl Blocks {
     pub fn number(&self) -> usize {
         self.bounds.len()
     }
+}
+
+/// The blocks of each square of this side that reaches beyond the last sample.
+fn edge_squares(count: [i32; 2], last: Place, side: i32, edge_side: i32) -> Vec<Vec<usize>> {
+    let mut squares = BTreeMap::<Place, Vec<usize>>::new();
+    for block in 0..count[0] * count[1] {
+        let square = [block % count[0], block / count[0]].map(|n| n * side / edge_side);
+        if (0..2).any(|axis| (square[axis] + 1) * edge_side > last[axis]) {
+            squares.entry(square).or_default().push(block as usize);
+        }
+    }
+    squares.into_values().collect()
 }
 
 fn bounds(field: &Field, last: Place, side: i32, at: Place) -> Option<Aabb> {

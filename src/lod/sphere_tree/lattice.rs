@@ -7,8 +7,9 @@
 //! its *parents* have, those whose middles are its wedges' apexes; its *children* are in the middles of its four sides.
 //!
 //! The root square is as large as the field's longer side or larger. Vertices beyond the field collapse onto its edge:
-//! hypotenuses are lines of the lattice or diagonals, and so no triangle turns over by that. Diamonds that do not reach
-//! into the field are left out.
+//! hypotenuses are lines of the lattice or diagonals, and so no triangle turns over by that. Diagonals that cross the
+//! edge bend, so that a collapsed wedge covers other land than the two halves it splits into do. Hence coarse diamonds
+//! that stick out always split ([`Lattice::always_splits`]). Diamonds that do not reach into the field are left out.
 
 /// A vertex of the lattice, finest samples from the field's first one on; in the root square, maybe beyond the field.
 pub type Place = [i32; 2];
@@ -45,6 +46,21 @@ pub fn half_length([x, z]: Place) -> i32 {
     both & both.wrapping_neg()
 }
 
+/// Blocks along the root square's side, at most.
+const MAX_BLOCKS_ALONG: i32 = 32;
+/// The smallest side of a block, cells.
+const MIN_BLOCK_SIDE: i32 = 32;
+/// Blocks along a square that is culled as one at the field's edge: a power of two. More take fewer triangles at wide
+/// tolerances, and cull less at narrow ones. Triangles over 921 × 859 samples of mountains, in eleven views together:
+///
+/// | tolerance | 1 | 2 | 4 | 8 blocks |
+/// |---|---|---|---|---|
+/// | 1 px | 411 905 | 412 212 | 415 521 | 425 636 |
+/// | 16 px | 11 741 | 10 928 | 10 677 | 10 656 |
+/// | 64 px | 3812 | 2767 | 2316 | 2161 |
+/// | all land is flat, one view | 314 | 139 | 60 | 24 |
+const EDGE_BLOCKS: i32 = 2;
+
 /// The diamonds over a field.
 #[derive(Clone, Debug)]
 pub struct Lattice {
@@ -73,6 +89,16 @@ impl Lattice {
     /// Side of the root square, samples.
     pub fn side(&self) -> i32 {
         1 << self.depth
+    }
+
+    /// Side of the aligned squares by which triangles are culled, cells: a power of two, at most the root square's.
+    pub fn block_side(&self) -> i32 {
+        (self.side() / MAX_BLOCKS_ALONG).max(MIN_BLOCK_SIDE).min(self.side())
+    }
+
+    /// Side of the aligned squares whose blocks are culled together where the field's edge crosses them, cells.
+    pub fn edge_side(&self) -> i32 {
+        (EDGE_BLOCKS * self.block_side()).min(self.side())
     }
 
     /// The number of levels of cells' middles.
@@ -137,6 +163,21 @@ impl Lattice {
     /// Whether a vertex lies in the root square.
     pub fn contains(&self, [x, z]: Place) -> bool {
         (0..=self.side()).contains(&x) && (0..=self.side()).contains(&z)
+    }
+
+    /// Whether a wedge collapses onto the field's edge.
+    #[inline]
+    pub fn collapses(&self, wedge: [Place; 3]) -> bool {
+        let [[ax, az], [bx, bz], [cx, cz]] = wedge.map(|at| self.on_field(at));
+        i64::from(bz - az) * i64::from(cx - ax) == i64::from(bx - ax) * i64::from(cz - az)
+    }
+
+    /// Whether a diamond splits in every view: it sticks out of the field and is larger than a square of blocks that are
+    /// culled together. So no drawn wedge sticks out of the square that it is culled with.
+    pub fn always_splits(&self, middle: Place) -> bool {
+        let Diamond { ends, apexes } = Diamond::around(middle);
+        let has_area = |&apex: &Place| self.contains(apex) && !self.collapses([apex, ends[0], ends[1]]);
+        2 * half_length(middle) > self.edge_side() && self.sticks_out(middle) && apexes.iter().any(has_area)
     }
 
     /// Whether a diamond has a corner beyond the field.

@@ -29,7 +29,8 @@ pub struct Measured {
     pub field: Arc<Field>,
     /// Diamonds.
     pub lattice: Lattice,
-    /// By index, metres: the largest distance of an unsplit diamond's triangles from the samples.
+    /// By index, metres: the largest distance of an unsplit diamond's triangles from the samples; infinite where it
+    /// always splits.
     errors: Vec<f32>,
     /// By index, metres: the ball about the middle.
     balls: Vec<f32>,
@@ -103,15 +104,24 @@ impl Measured {
         let index = self.lattice.index(middle).expect("a place of the level");
         let Diamond { ends, apexes } = Diamond::around(middle);
         let centre = self.centre(middle);
-        let (mut error, mut ball) = (0.0f32, 0.0f64);
+        let always_splits = self.lattice.always_splits(middle);
+        let sticks_out = self.lattice.sticks_out(middle);
+        let (mut error, mut ball) = (if always_splits { f32::INFINITY } else { 0.0f32 }, 0.0f64);
         for apex in apexes.into_iter().filter(|&apex| self.lattice.contains(apex)) {
-            error = error.max(self.deviation([apex, ends[0], ends[1]]));
-            ball = [apex, ends[0], ends[1]].map(|at| self.centre(at).distance(centre)).into_iter().fold(ball, f64::max);
+            let corners = [apex, ends[0], ends[1]];
+            ball = corners.map(|at| self.centre(at).distance(centre)).into_iter().fold(ball, f64::max);
+            let Some(triangle) = self.collapsed(corners).filter(|_| !always_splits) else { continue };
+            error = error.max(surface::deviation(&self.field, &triangle));
+            if sticks_out {
+                // Its halves may cover other samples.
+                surface::visit_samples(&triangle, |x, z, _| {
+                    ball = ball.max(self.centre([x as i32, z as i32]).distance(centre));
+                });
+            }
         }
         if error > 0.0 {
             error += self.rounding;
         }
-        let sticks_out = self.lattice.sticks_out(middle);
         for (at, child) in self.lattice.children(middle) {
             let further = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
             error = error.max(self.errors[child] * further);
@@ -120,16 +130,16 @@ impl Measured {
         (index, error, ((ball * (1.0 + SPARE)) as f32).next_up())
     }
 
-    /// How far a triangle is from the samples in it, metres; 0 if it collapses.
-    fn deviation(&self, corners: [Place; 3]) -> f32 {
+    /// A wedge as it is drawn, facing up; `None` if it collapses.
+    fn collapsed(&self, corners: [Place; 3]) -> Option<surface::Triangle> {
         let [a, b, c] = corners.map(|at| {
             let [x, z] = self.lattice.on_field(at);
             Corner { x, z, y: self.field.height(x as u32, z as u32) }
         });
         match surface::doubled_area(&[a, b, c]) {
-            0 => 0.0,
-            area if area > 0 => surface::deviation(&self.field, &[a, b, c]),
-            _ => surface::deviation(&self.field, &[a, c, b]),
+            0 => None,
+            area if area > 0 => Some([a, b, c]),
+            _ => Some([a, c, b]),
         }
     }
 

@@ -153,7 +153,7 @@ impl Mesh<'_> {
             small.extend(self.blocks.seen(wedge.map(|corner| corner.at)).map(|block| (block, *wedge)));
         } else if let Some(halves) = self.halves(wedge) {
             halves.iter().for_each(|half| self.descend(half, large, small));
-        } else if self.covers_a_seen_block(wedge.map(|corner| corner.at)) {
+        } else if self.has_area(wedge) && self.covers_a_seen_block(wedge.map(|corner| corner.at)) {
             large.push(*wedge);
         }
     }
@@ -164,9 +164,11 @@ impl Mesh<'_> {
         (0..2).all(|k| length(k).max().unwrap_or(0) - length(k).min().unwrap_or(0) <= self.blocks.side)
     }
 
+    /// A wedge that sticks out is drawn in a square whose blocks are seen together.
     fn covers_a_seen_block(&self, wedge: [Place; 3]) -> bool {
-        if self.is_within_a_block(&wedge) {
-            return self.blocks.seen(wedge).is_some();
+        let drawn = wedge.map(|at| self.measured.lattice.on_field(at));
+        if self.is_within_a_block(&wedge) || drawn != wedge {
+            return self.blocks.seen(drawn).is_some();
         }
         let [apex, left, right] = wedge;
         let middle = [0, 1].map(|k| (left[k] + right[k]) / 2);
@@ -215,8 +217,7 @@ impl Mesh<'_> {
 
     /// Whether a wedge does not collapse onto the field's edge.
     fn has_area(&self, wedge: &Wedge) -> bool {
-        let [[ax, az], [bx, bz], [cx, cz]] = wedge.map(|corner| self.measured.lattice.on_field(corner.at));
-        i64::from(bz - az) * i64::from(cx - ax) != i64::from(bx - ax) * i64::from(cz - az)
+        !self.measured.lattice.collapses(wedge.map(|corner| corner.at))
     }
 }
 

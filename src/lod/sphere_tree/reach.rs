@@ -55,15 +55,18 @@ impl Reach {
         }
     }
 
-    /// Whether a diamond of this error has a sphere. If it has none, its children have none.
+    /// Whether a diamond of this error has a sphere. If it has none, its children have none. An infinite error always has.
     #[inline]
     pub fn matters(&self, error: f32) -> bool {
-        f64::from(error) > self.harmless.max(0.0)
+        f64::from(error) > self.harmless.max(0.0) || error == f32::INFINITY
     }
 
-    /// The radius of a diamond's sphere, metres; negative if it has none.
+    /// The radius of a diamond's sphere, metres; negative if it has none, infinite if its error is.
     #[inline]
     pub fn radius(&self, known: &Known) -> f64 {
+        if known.error == f32::INFINITY {
+            return f64::INFINITY;
+        }
         if !self.matters(known.error) {
             return -1.0;
         }

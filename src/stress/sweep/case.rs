@@ -1,0 +1,92 @@
+//! A case of the sweep as plain data, and its check against every invariant.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::str::FromStr;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::Failure;
+use super::terrain::Terrain;
+use super::viewpoint::Viewpoint;
+use crate::height::Field;
+use crate::lod::{self, Entry, Settings};
+use crate::stress::laws::{Broken, LAWS, Subject};
+use crate::stress::panic_text;
+use crate::view::{Metric, Tolerance, View};
+
+/// A technique with settings, terrain, a view and a tolerance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SweepCase {
+    /// Name of the technique.
+    pub technique: String,
+    /// Variant, unless it is the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
+    /// Keys and values that are not the defaults.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub settings: Vec<(String, String)>,
+    /// The terrain.
+    pub terrain: Terrain,
+    /// The view, relative to the terrain.
+    pub view: Viewpoint,
+    /// Tolerance, pixels.
+    pub tolerance_px: f64,
+    /// Whether the tolerance is the paper's and not the certified one.
+    #[serde(default)]
+    pub paper_metric: bool,
+}
+
+impl SweepCase {
+    /// The technique's row.
+    pub fn entry(&self) -> Result<&'static Entry, String> {
+        lod::find(&self.technique).ok_or_else(|| format!("{}: no such technique", self.technique))
+    }
+
+    /// The terrain and the view.
+    pub fn scene(&self) -> (Arc<Field>, View) {
+        let field = Arc::new(self.terrain.field());
+        let metric = if self.paper_metric { Metric::Paper } else { Metric::Certified };
+        let view = self.view.view(&field, Tolerance { px: self.tolerance_px, metric });
+        (field, view)
+    }
+
+    /// Holds the case against every invariant. Returns the first that fails; a panic is a failure.
+    pub fn check(&self) -> Result<(), Failure> {
+        let (field, view) = self.scene();
+        let views = [("the case's view", view)];
+        let fail = |law, broken| Failure { case: self.clone(), law, broken };
+        match catch_unwind(AssertUnwindSafe(|| self.keeps_laws(&field, &views))) {
+            Ok(outcome) => outcome.map_err(|(law, broken)| fail(law, broken)),
+            Err(panic) => Err(fail("no panic", Broken::new(views[0], panic_text(&*panic)))),
+        }
+    }
+
+    fn keeps_laws(&self, field: &Arc<Field>, views: &[(&'static str, View)]) -> Result<(), (&'static str, Broken)> {
+        let prepared = self.entry().and_then(|entry| {
+            let settings = Settings::new(entry, self.variant.as_deref(), &self.settings)?;
+            entry.prepare(field, &settings)
+        });
+        let mut technique = prepared.map_err(|why| ("it can be prepared", Broken::new(views[0], why)))?;
+        let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
+        let mut subject =
+            Subject { field, technique: &mut *technique, views, tolerances_px: &tolerances_px, time_s: 0.0 };
+        let mut laws = LAWS.iter().filter(|law| law.is_for(&self.technique));
+        laws.try_for_each(|law| (law.check)(&mut subject).map_err(|broken| (law.name, broken)))
+    }
+}
+
+impl fmt::Display for SweepCase {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&serde_json::to_string(self).map_err(|_| fmt::Error)?)
+    }
+}
+
+impl FromStr for SweepCase {
+    type Err = String;
+
+    fn from_str(line: &str) -> Result<Self, String> {
+        serde_json::from_str(line).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,64 @@
+//! The random sweep: every technique on random terrain, in random settings and views, held against every invariant.
+//!
+//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`LAWS`] ([`case`]). One that
+//! fails is made smaller as long as it fails in the same way ([`shrink`]), and is printed as one line of JSON that runs
+//! again anywhere.
+
+pub mod case;
+pub mod random;
+pub mod shrink;
+pub mod terrain;
+pub mod viewpoint;
+
+use rayon::prelude::*;
+
+pub use self::case::SweepCase;
+use super::forms::Form;
+use super::laws::Broken;
+use super::{Case, Finding, Kind};
+
+/// The family `sweep`.
+pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::Each(of_form) }];
+
+/// Cases of each form that the stress suite runs, and their seed.
+const SUITE_CASES: u64 = 200;
+const SUITE_SEED: u64 = 19;
+
+/// Failures that are made smaller, at most: each takes as long as hundreds of cases.
+const MAX_SHRUNK: usize = 4;
+
+/// A case that does not keep an invariant.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// The case.
+    pub case: SweepCase,
+    /// The invariant.
+    pub law: &'static str,
+    /// The view and the reason.
+    pub broken: Broken,
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.law, self.broken.why, self.case)
+    }
+}
+
+/// Runs cases on all cores. Returns the failures in order, the first few of them shrunk.
+pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
+    let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).collect();
+    let few = failures.len().min(MAX_SHRUNK);
+    failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone()));
+    failures
+}
+
+/// Random cases of one technique and variant.
+fn of_form(form: &Form) -> Vec<Finding> {
+    let case = |number| random::case(SUITE_SEED, number, form.entry, Some(form.variant));
+    let failures = run((0..SUITE_CASES).into_par_iter().map(case));
+    let first = failures.first();
+    let count = Finding::within("cases that fail", failures.len() as f64, 0.0);
+    vec![
+        Finding { broken: first.map(|failure| failure.broken.clone()), ..count }.because(first.map(Failure::to_string)),
+    ]
+}

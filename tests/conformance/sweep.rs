@@ -1,0 +1,119 @@
+//! Random cases of every technique, held against every invariant.
+//!
+//! `SWEEP_CASES` sets their number, `SWEEP_SEED` their seed; `SWEEP_TECHNIQUE` picks one technique; `SWEEP_CASE` runs
+//! the one case that a failure printed.
+
+use std::env;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cuesta::cli::whole::Whole;
+use cuesta::draw::DrawList;
+use cuesta::height::{self, Field, Options, synth};
+use cuesta::lod::{self, Settings};
+use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::sweep::{self, SweepCase, random};
+use cuesta::stress::views;
+use cuesta::view::{Lens, Metric, Tolerance, View};
+use rayon::prelude::*;
+
+/// Cases of a run where nothing else is set: about two minutes on two cores.
+const CASES: u64 = 6000;
+const SEED: u64 = 19;
+
+fn set<T: FromStr>(key: &str) -> Option<T> {
+    let value = env::var(key).ok()?;
+    Some(value.parse().unwrap_or_else(|_| panic!("{key}={value}: it cannot be read")))
+}
+
+#[test]
+fn random_cases_keep_every_law() {
+    if let Some(case) = set::<SweepCase>("SWEEP_CASE") {
+        case.check().unwrap_or_else(|failure| panic!("{failure}"));
+        return;
+    }
+    let (cases, seed) = (set("SWEEP_CASES").unwrap_or(CASES), set("SWEEP_SEED").unwrap_or(SEED));
+    let entry = set::<String>("SWEEP_TECHNIQUE").map(|name| lod::find(&name).expect("a technique"));
+    let case = |number| match entry {
+        Some(entry) => random::case(seed, number, entry, None),
+        None => random::any(seed, number),
+    };
+    let start = Instant::now();
+    let failures = sweep::run((0..cases).into_par_iter().map(case));
+    let minutes = start.elapsed().as_secs_f64() / 60.0;
+    println!("{cases} cases, {:.0} a minute, {} fail", cases as f64 / minutes, failures.len());
+    let few: Vec<_> = failures.iter().take(8).map(ToString::to_string).collect();
+    assert!(few.is_empty(), "{} of {cases} cases fail, the first:\n{}", failures.len(), few.join("\n"));
+}
+
+/// Fields whose sides are not 2^n + 1, and tolerances at which coarse triangles stick out of them, once drawn with holes.
+#[test]
+fn coarse_triangles_reach_the_edge_of_any_field() {
+    let made = |kind: &str, size, seed| {
+        let field = synth::synth(kind.parse().expect("a kind"), size, seed);
+        (format!("{kind} {} x {}", size[0], size[1]), Some(Arc::new(field)))
+    };
+    let fields = [
+        (made("ridge", [921, 859], 3), &[4.0, 8.0][..]),
+        (made("cliff", [921, 859], 3), &[4.0, 8.0]),
+        (made("eroded", [921, 859], 3), &[16.0, 64.0]),
+        (made("eroded", [1198, 9], 3), &[1.7, 30.0]),
+        (made("spike", [55, 311], 3), &[2.4]),
+        (made("flat", [226, 70], 3), &[0.7]),
+        (real("gabilan_lidar1m_921x859_f32_cog_deflate_pred3.tif"), &[1.0, 2.0, 3.0, 4.0]),
+    ];
+    let forms: [&[(&str, &str)]; 3] = [&[], &[("morph", "on"), ("hold", "on")], &[("patches", "resident")]];
+    fields.par_iter().for_each(|((name, field), tolerances_px)| {
+        let Some(field) = field else { return };
+        let views: Vec<_> = views::views(field).into_iter().chain([("all of it", default_view(field))]).collect();
+        for form in forms {
+            let choices: Vec<_> = form.iter().map(|(key, word)| (key.to_string(), word.to_string())).collect();
+            let entry = lod::find("sphere-tree").expect("a row of the table");
+            let settings = Settings::new(entry, None, &choices).expect("the table's own words");
+            let mut technique = (entry.build)(Arc::clone(field), &settings);
+            let under = |view: &(&'static str, View)| {
+                let (name, view) = *view;
+                tolerances_px.iter().map(move |&px| (name, views::with_tolerance(&view, px)))
+            };
+            let views: Vec<_> = views.iter().flat_map(under).collect();
+            let mut subject = Subject { field, technique: &mut *technique, views: &views, tolerances_px, time_s: 0.0 };
+            for law in LAWS.iter().filter(|law| law.name != "teleport and return, same list") {
+                (law.check)(&mut subject).unwrap_or_else(|why| panic!("{}: {name}, {form:?}: {why}", law.name));
+            }
+        }
+    });
+}
+
+/// The view that `render` takes by default.
+fn default_view(field: &Field) -> View {
+    let size = [640, 360];
+    let Whole { eye, world_from_eye, radius, .. } = Whole::of(field, 60.0, size);
+    let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
+    let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
+    View { eye, world_from_eye, lens, size, near: radius / 1000.0, tolerance, time_s: 0.0 }
+}
+
+fn real(file: &str) -> (String, Option<Arc<Field>>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(file);
+    if !path.exists() {
+        eprintln!("skipped: {} is absent", path.display());
+        return (file.to_string(), None);
+    }
+    (file.to_string(), Some(Arc::new(height::load(&path, &Options::default()).expect("a field").field)))
+}
+
+/// The list that a flat field needs stays short, whatever its size.
+#[test]
+fn a_flat_field_of_any_size_takes_few_triangles() {
+    for (size, most) in [([226, 70], 15), ([921, 859], 139), ([129, 129], 2), ([20, 31], 2), ([1300, 2], 22)] {
+        let field = Arc::new(synth::synth(synth::Kind::Flat, size, 3));
+        let entry = lod::find("sphere-tree").expect("a row of the table");
+        let mut technique = (entry.build)(Arc::clone(&field), &Settings::defaults(entry));
+        let mut list = DrawList::default();
+        technique.select(&default_view(&field), &mut list);
+        println!("{size:?}: {} triangles", list.triangles());
+        assert!(list.triangles() <= most, "{size:?}: {} triangles", list.triangles());
+    }
+}
