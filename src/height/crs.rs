@@ -13,7 +13,7 @@ use super::{
 const WEB_MERCATOR: [u32; 5] = [3857, 3785, 900_913, 102_100, 102_113];
 
 /// Metres a unit of systems in other units than metres that neither registry holds; EPSG registry v11.022.
-const ABSENT: [(u32, f64); 3] = [(3139, 0.201168), (10_622, US_FOOT), (22_300, 1000.0)];
+const ABSENT: [(u32, f64); 4] = [(3139, 0.201168), (6200, US_FOOT), (10_622, US_FOOT), (22_300, 1000.0)];
 
 /// The part of a coordinate reference system that placing a raster needs.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -130,19 +130,4 @@ pub(super) fn is_web_mercator(text: &str) -> bool {
         || ["EPSG", "ESRI"].iter().any(|authority| {
             squeezed.strip_prefix(authority).is_some_and(|code| codes.iter().any(|known| known == code))
         })
-}
-
-#[cfg(test)]
-mod dump {
-    #[test]
-    fn dump() {
-        use super::*;
-        let mut out = String::new();
-        for code in 1..=65535u32 {
-            if let Some(c) = from_epsg(code) {
-                out += &format!("{code}\t{:?}\t{:?}\t{}\n", c.unit, c.height_unit, c.is_depth);
-            }
-        }
-        std::fs::write("/tmp/dump.tsv", out).unwrap();
-    }
 }

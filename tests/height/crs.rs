@@ -13,7 +13,7 @@ use super::{
 /// `height_unit_m` is empty where nothing states the unit of heights.
 const UNITS: &str = include_str!("epsg_units.csv");
 
-/// Metres or radians a unit at least: no unit of length in the table is as small as a unit of angle of its kind.
+/// The file of a row, its spacing, its unit of height, and true for a unit of distance shorter than a metre.
 fn row(record: &csv::StringRecord) -> (TiffFile, [f64; 2], Option<f64>, bool) {
     let pairs = |text: &str| -> Vec<(u16, f64)> {
         let pair = |word: &str| word.split_once('=').map(|(k, v)| (k.parse().unwrap(), v.parse().unwrap()));
@@ -86,7 +86,7 @@ fn codes_that_no_registry_holds_and_contradictions_are_warned_of() {
         loaded
     };
     warned(&keys(&[[1024, 1], [3072, 1]]), "EPSG:1:");
-    warned(&keys(&[[1024, 2], [2048, 1]]).clone(), "EPSG:1:");
+    warned(&TiffFile::new(SIZE, 16, 2).placed([0.1, 0.1], [7.0, 45.0]).keys(&[[1024, 2], [2048, 1]]), "EPSG:1:");
     warned(&keys(&[[1024, 1], [3072, 32611], [4096, 5715]]), "depths");
     // The code decides, as in GDAL.
     let loaded = warned(&keys(&[[1024, 1], [3072, 32611], [4096, 6360], [4099, 9001]]), "VerticalUnits");
