@@ -40,6 +40,9 @@ pub struct ReadArgs {
     /// Multiplies every height.
     #[arg(long, value_name = "S")]
     pub height_scale: Option<f64>,
+    /// Added to every height, metres; after the scale.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = 0.0)]
+    pub height_offset: f64,
     /// The value that means "no data", instead of what the file says.
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub nodata: Option<f64>,
@@ -293,6 +296,7 @@ impl ReadArgs {
         let options = Options {
             spacing: self.spacing,
             height_scale: self.height_scale,
+            height_offset: self.height_offset,
             nodata: self.nodata,
             raw: self.raw,
             crop: self.crop,

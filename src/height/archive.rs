@@ -15,6 +15,8 @@ use super::{
 const UNPACKED_BYTES: u64 = 1 << 31;
 /// The most members looked at.
 const MEMBERS: usize = 4096;
+/// Ends of the names of small files that describe a member.
+const SIDECARS: [&str; 10] = [".hdr", ".prj", ".aux.xml", ".wld", ".tfw", ".tifw", ".tiffw", ".pgw", ".pngw", ".blw"];
 /// The most bytes of a header or projection beside a member.
 const SIBLING_BYTES: u64 = 1 << 16;
 
@@ -71,11 +73,12 @@ pub(super) fn read_zip(source: &mut Source, options: &Options) -> Result<Raster,
 
 fn is_text(member: &str) -> bool {
     let lower = member.to_lowercase();
-    lower.ends_with(".hdr") || lower.ends_with(".prj")
+    SIDECARS.iter().any(|extension| lower.ends_with(extension))
 }
 
 fn is_stem(other: &str, stem: &str, extension: &str) -> bool {
-    other.rsplit_once('.').is_some_and(|(s, e)| s == stem && e.eq_ignore_ascii_case(extension))
+    let rest = other.strip_prefix(stem).and_then(|rest| rest.strip_prefix('.'));
+    rest.is_some_and(|rest| rest.eq_ignore_ascii_case(extension))
 }
 
 /// No format needs more than 16 bytes a sample, but for texts of unusual length.

@@ -2,7 +2,8 @@
 
 use super::{
     Error, Samples,
-    georef::{self, Grid, Place},
+    affine::Affine,
+    georef::Grid,
     load::{Options, Source},
     raster::Raster,
     text::Words,
@@ -41,7 +42,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let size = size.map(|n| n as u32);
     let mut raster = Raster::new("ESRI ASCII grid", "text", size, Samples::F32(heights));
     raster.nodata = header.value(&["nodata_value", "nodata"]);
-    (raster.place, raster.warnings) = place(source, header.grid(source, size)?, size);
+    raster.georeference.affine = Some(Affine::north_up(header.grid(source, size)?));
     Ok(raster)
 }
 
@@ -91,17 +92,6 @@ impl Header {
         let west = corner("xllcorner", "xllcenter", dx);
         let north = corner("yllcorner", "yllcenter", dy) + dy * f64::from(rows - 1);
         Ok(([west, north], [dx, dy]))
-    }
-}
-
-/// The place by the projection beside the file, else by the look of the coordinates.
-pub(super) fn place(source: &Source, grid: Grid, size: [u32; 2]) -> (Option<Place>, Vec<String>) {
-    match source.sibling_text("prj").and_then(|text| georef::from_wkt(&text)) {
-        Some((unit, crs)) => (Some(Place { origin: grid.0, step: grid.1, unit, crs }), Vec::new()),
-        None => {
-            let (place, warning) = Place::guessed(grid, size);
-            (Some(place), vec![warning])
-        }
     }
 }
 

@@ -6,12 +6,15 @@ use std::{
 };
 
 use super::{
-    Error, asc, envi,
-    georef::{Grid, Place, Unit},
+    Error,
+    affine::Affine,
+    asc, envi,
+    georef::Grid,
     load::{Options, Source},
     raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
+    sidecar::Georeference,
 };
 
 /// Keys that a header of bare samples has and an ASCII grid lacks.
@@ -45,10 +48,8 @@ pub(super) struct Header {
     /// Bytes from one row to the next, if not those of its samples.
     pub stride: Option<u64>,
     pub nodata: Option<f64>,
-    /// Where the samples lie.
-    pub grid: Option<Grid>,
-    /// Unit and name of the coordinate system.
-    pub system: Option<(Unit, Option<String>)>,
+    /// Position, system and scale.
+    pub georeference: Georeference,
 }
 
 /// Reads the samples by the header beside them.
@@ -69,12 +70,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let rows = Rows { sample: header.sample, order: header.order, start: header.start, stride };
     let mut raster = Raster::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
     raster.nodata = header.nodata;
-    if let Some((origin, step)) = header.grid {
-        (raster.place, raster.warnings) = match header.system {
-            Some((unit, crs)) => (Some(Place { origin, step, unit, crs }), Vec::new()),
-            None => asc::place(source, (origin, step), size),
-        };
-    }
+    raster.georeference = header.georeference;
     Ok(raster)
 }
 
@@ -133,8 +129,7 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
         start: values.number("skipbytes")?.unwrap_or(0),
         stride: values.number("totalrowbytes")?,
         nodata,
-        grid: grid(&values, size)?,
-        system: None,
+        georeference: Georeference { affine: grid(&values, size)?.map(Affine::north_up), ..Georeference::default() },
     })
 }
 

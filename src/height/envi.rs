@@ -4,9 +4,13 @@ use std::collections::BTreeMap;
 
 use super::{
     Error,
+    affine::Affine,
     bil::{Header, Values},
-    georef::{self, FOOT, Unit},
+    crs::{self, Crs},
+    georef::{Ellipsoid, Unit},
     sample::{Order, SampleType},
+    sidecar::Georeference,
+    units,
 };
 
 /// Whether a file is such a header.
@@ -36,8 +40,6 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Header, Error> {
         1 => Order::Big,
         other => return Err(values.error("byte order", format!("expected 0 or 1, found {other}"))),
     };
-    let map = Map::parse(&values)?;
-    let system = values.text("coordinate system string").and_then(georef::from_wkt);
     Ok(Header {
         format: "ENVI",
         size: [values.required("samples")?, values.required("lines")?],
@@ -46,8 +48,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Header, Error> {
         start: values.number("header offset")?.unwrap_or(0),
         stride: None,
         nodata: values.number("data ignore value")?,
-        grid: map.as_ref().map(|map| (map.origin, map.step)),
-        system: system.or(map.map(|map| (map.unit, map.crs))),
+        georeference: georeference(&values)?,
     })
 }
 
@@ -67,39 +68,69 @@ fn pairs(text: &str) -> BTreeMap<String, String> {
     values
 }
 
-/// `map info`: projection, reference pixel (1, 1 is the corner of the first sample), its coordinates, steps,
-/// zone, hemisphere and datum, units.
-struct Map {
-    origin: [f64; 2],
-    step: [f64; 2],
-    unit: Unit,
-    crs: Option<String>,
-}
-
-impl Map {
-    fn parse(values: &Values) -> Result<Option<Self>, Error> {
-        let Some(text) = values.text("map info") else { return Ok(None) };
-        let fields: Vec<&str> = text.split(',').map(str::trim).collect();
-        let wrong = || values.error("map info", format!("expected a name and six numbers, found {text:?}"));
-        let numbers: Vec<f64> = fields.iter().skip(1).map_while(|field| field.parse().ok()).take(6).collect();
-        let &[column, row, east, north, dx, dy] = numbers.as_slice() else { return Err(wrong()) };
-        let lower = text.to_lowercase();
-        let unit = match () {
-            _ if lower.starts_with("geographic") || lower.contains("units=degrees") => Unit::Degrees,
-            _ if georef::is_web_mercator(&text.to_uppercase()) => Unit::Mercator,
-            _ if lower.contains("units=feet") => Unit::Metres(FOOT),
-            _ => Unit::Metres(1.0),
-        };
-        Ok(Some(Self {
-            origin: [east + (1.5 - column) * dx, north - (1.5 - row) * dy],
-            step: [dx, dy],
-            unit,
-            crs: crs(&fields),
-        }))
+/// Position, system and scale.
+fn georeference(values: &Values) -> Result<Georeference, Error> {
+    let mut georeference = Georeference::default();
+    let fields: Option<Vec<&str>> = values.text("map info").map(|text| text.split(',').map(str::trim).collect());
+    if let Some(fields) = &fields {
+        georeference.affine = Some(affine(values, fields)?);
     }
+    let stated = values.text("coordinate system string").and_then(crs::from_text);
+    georeference.crs = stated.or_else(|| fields.map(|fields| system(&fields)));
+    georeference.band.scale = first(values, "data gain values")?;
+    georeference.band.offset = first(values, "data offset values")?;
+    Ok(georeference)
 }
 
-fn crs(fields: &[&str]) -> Option<String> {
+/// The first number of a list.
+fn first(values: &Values, key: &str) -> Result<Option<f64>, Error> {
+    let Some(text) = values.text(key) else { return Ok(None) };
+    let number = text.split(',').next().and_then(|word| word.trim().parse::<f64>().ok()).filter(|n| n.is_finite());
+    number.map(Some).ok_or_else(|| values.error(key, format!("expected a number, found {text:?}")))
+}
+
+/// The value of a `key=value` field of `map info`.
+fn named<'a>(fields: &[&'a str], key: &str) -> Option<&'a str> {
+    fields.iter().find_map(|field| {
+        let (name, value) = field.split_once('=')?;
+        name.trim().eq_ignore_ascii_case(key).then(|| value.trim())
+    })
+}
+
+/// `map info`: projection, reference pixel (1, 1 is the corner of the first sample), its coordinates, steps,
+/// zone, hemisphere and datum, units, rotation about the reference pixel in degrees.
+fn affine(values: &Values, fields: &[&str]) -> Result<Affine, Error> {
+    let wrong = || values.error("map info", format!("expected a name and six numbers, found {:?}", fields.join(", ")));
+    let numbers: Vec<f64> = fields.iter().skip(1).map_while(|field| field.parse().ok()).take(6).collect();
+    let &[column, row, east, north, dx, dy] = numbers.as_slice() else { return Err(wrong()) };
+    let rotation: f64 = match named(fields, "rotation") {
+        Some(text) => text.parse().map_err(|_| values.error("map info rotation", "expected degrees"))?,
+        None => 0.0,
+    };
+    let (sin, cos) = rotation.to_radians().sin_cos();
+    // A quarter turn has no rounding left across its axes.
+    let [sin, cos] = [sin, cos].map(|part| if part.abs() < 1e-12 { 0.0 } else { part });
+    let at_reference = Affine { origin: [east, north], column: [dx * cos, dy * sin], row: [dx * sin, -dy * cos] };
+    Ok(at_reference.shifted([1.5 - column, 1.5 - row]))
+}
+
+/// The system that `map info` describes.
+fn system(fields: &[&str]) -> Crs {
+    let projection = fields.first().copied().unwrap_or_default();
+    let unit = named(fields, "units").unwrap_or_default();
+    let is_geographic = projection.to_lowercase().starts_with("geographic") || unit.eq_ignore_ascii_case("degrees");
+    let unit = match () {
+        _ if is_geographic => {
+            let radians = units::named_angle(unit).unwrap_or(1f64.to_radians());
+            Unit::Angles { radians, ellipsoid: Ellipsoid::WGS84 }
+        }
+        _ if crs::is_web_mercator(projection) => Unit::Mercator,
+        _ => Unit::Metres(units::named_length(unit).unwrap_or(1.0)),
+    };
+    Crs { unit: Some(unit), name: name(fields), ..Crs::default() }
+}
+
+fn name(fields: &[&str]) -> Option<String> {
     let name = fields.first()?.to_lowercase();
     let wgs84 = fields.iter().any(|field| field.eq_ignore_ascii_case("WGS-84"));
     let zone = fields.get(7).and_then(|zone| zone.parse::<u32>().ok()).filter(|zone| (1..=60).contains(zone));

@@ -9,17 +9,43 @@ pub const FOOT: f64 = 0.3048;
 /// US survey foot, metres.
 pub const US_FOOT: f64 = 1200.0 / 3937.0;
 
-/// Metres per degree of longitude and of latitude on the WGS 84 ellipsoid.
-///
-/// The usual series of the lengths of a degree of the parallel and of the meridian at latitude φ (degrees),
-/// good to a centimetre: 111412.84 cos φ − 93.5 cos 3φ + 0.118 cos 5φ and
-/// 111132.92 − 559.82 cos 2φ + 1.175 cos 4φ − 0.0023 cos 6φ.
+/// An ellipsoid of revolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipsoid {
+    /// Semi-major axis, metres.
+    pub a: f64,
+    /// Flattening.
+    pub f: f64,
+}
+
+impl Ellipsoid {
+    /// The ellipsoid of GPS.
+    pub const WGS84: Self = Self { a: 6_378_137.0, f: 1.0 / 298.257_223_563 };
+
+    /// An ellipsoid, if the numbers describe one.
+    pub fn new(a: f64, f: f64) -> Option<Self> {
+        (a.is_finite() && a > 0.0 && (0.0..0.5).contains(&f)).then_some(Self { a, f })
+    }
+
+    /// Returns true for the size of the Earth, within a percent.
+    pub fn is_earth(self) -> bool {
+        (self.a / Self::WGS84.a - 1.0).abs() < 0.01
+    }
+
+    /// Metres per radian of longitude and of latitude at latitude φ, radians.
+    ///
+    /// The radius of the parallel N cos φ and the radius of curvature of the meridian M, with
+    /// N = a / √(1 − e² sin² φ) and M = a (1 − e²) / (1 − e² sin² φ)^(3/2).
+    pub fn metres_per_radian(self, latitude: f64) -> [f64; 2] {
+        let e2 = self.f * (2.0 - self.f);
+        let w2 = 1.0 - e2 * latitude.sin().powi(2);
+        [self.a / w2.sqrt() * latitude.cos(), self.a * (1.0 - e2) / (w2 * w2.sqrt())]
+    }
+}
+
+/// Metres per degree of longitude and of latitude on the WGS 84 ellipsoid, at a latitude in degrees.
 pub fn metres_per_degree(latitude: f64) -> [f64; 2] {
-    let cos = |n: f64| (n * latitude.to_radians()).cos();
-    [
-        111_412.84 * cos(1.0) - 93.5 * cos(3.0) + 0.118 * cos(5.0),
-        111_132.92 - 559.82 * cos(2.0) + 1.175 * cos(4.0) - 0.0023 * cos(6.0),
-    ]
+    Ellipsoid::WGS84.metres_per_radian(latitude.to_radians()).map(f64::to_radians)
 }
 
 /// Latitude, degrees, of a web Mercator northing, metres.
@@ -33,12 +59,22 @@ pub const MERCATOR_HALF: f64 = MERCATOR_RADIUS * TAU / 2.0;
 /// What a coordinate counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unit {
-    /// Longitude and latitude, degrees.
-    Degrees,
+    /// Longitude and latitude.
+    Angles {
+        /// Radians a unit.
+        radians: f64,
+        /// The body that they lie on.
+        ellipsoid: Ellipsoid,
+    },
     /// Projected lengths, in so many metres each.
     Metres(f64),
     /// Web Mercator metres, which are 1 / cos φ times too long on the ground.
     Mercator,
+}
+
+impl Unit {
+    /// Degrees of longitude and latitude on WGS 84.
+    pub const DEGREES: Self = Self::Angles { radians: TAU / 360.0, ellipsoid: Ellipsoid::WGS84 };
 }
 
 /// Coordinates of the north-west sample (east, north), and steps (east, south).
@@ -61,14 +97,19 @@ impl Place {
     /// Distance of neighbouring samples (x, z) on the ground and world position (x, z) of the north-west
     /// sample, metres, for `rows` rows.
     ///
-    /// Degrees become metres by [`metres_per_degree`] at the middle row. Web Mercator distances shrink by
+    /// Angles become metres by [`Ellipsoid::metres_per_radian`] at the middle row. Web Mercator distances shrink by
     /// cos φ of the middle row; its origin stays in Mercator metres.
     pub fn spacing_and_origin(&self, rows: u32) -> ([f64; 2], [f64; 2]) {
         let [east, north] = self.origin;
         let middle = north - self.step[1] * f64::from(rows - 1) / 2.0;
         let (ground, world) = match self.unit {
-            Unit::Degrees if middle.abs() > 90.0 => ([f64::NAN; 2], [f64::NAN; 2]),
-            Unit::Degrees => (metres_per_degree(middle), metres_per_degree(middle)),
+            Unit::Angles { radians, .. } if (middle * radians).abs() > TAU / 4.0 + 1e-9 => {
+                ([f64::NAN; 2], [f64::NAN; 2])
+            }
+            Unit::Angles { radians, ellipsoid } => {
+                let metres = ellipsoid.metres_per_radian(middle * radians).map(|metres| metres * radians);
+                (metres, metres)
+            }
             Unit::Metres(factor) => ([factor; 2], [factor; 2]),
             Unit::Mercator => ([mercator_latitude(middle).to_radians().cos(); 2], [1.0; 2]),
         };
@@ -92,60 +133,10 @@ impl Place {
         let local = origin[0].abs() <= step[0] && south.abs() <= 2.0 * step[1] && step[0] >= 0.1;
         let degrees = on_globe && !local && step[0] <= 1.0 && step[1] <= 1.0;
         let (unit, found) = match degrees {
-            true => (Unit::Degrees, "degrees of longitude and latitude"),
+            true => (Unit::DEGREES, "degrees of longitude and latitude"),
             false => (Unit::Metres(1.0), "metres"),
         };
         let warning = format!("no coordinate system is named; the coordinates look like {found} (--spacing overrides)");
         (Self { origin, step, unit, crs: None }, warning)
     }
-}
-
-/// Unit and name of the coordinate system that a projection text (`.prj`, well-known text) describes.
-pub fn from_wkt(text: &str) -> Option<(Unit, Option<String>)> {
-    let upper = text.to_ascii_uppercase();
-    let named = |keys: &[&str]| keys.iter().find_map(|key| upper.find(key));
-    // A compound system names a projected or geographic one, and then a vertical one.
-    let end = named(&["VERT_CS[", "VERTCS[", "VERTCRS["]).unwrap_or(upper.len());
-    let projected = named(&["PROJCS[", "PROJCRS[", "PROJECTEDCRS["]);
-    let degrees = named(&["GEOGCS[", "GEOGCRS[", "GEODCRS[", "GEODETICCRS[", "GEOGRAPHICCRS["]);
-    let begin = projected.or(degrees).unwrap_or(0).min(end);
-    let upper = &upper[begin..end];
-    let crs = epsg(upper).or_else(|| text.get(begin..)?.split('"').nth(1).map(str::to_owned));
-    if projected.is_none() && degrees.is_some() {
-        return Some((Unit::Degrees, crs));
-    }
-    if projected.is_some() {
-        let unit = match is_web_mercator(upper) {
-            true => Unit::Mercator,
-            false => Unit::Metres(last_unit(upper).unwrap_or(1.0)),
-        };
-        return Some((unit, crs));
-    }
-    // ARC/INFO wrote lines such as "Projection GEOGRAPHIC" and "Units DD".
-    let value = |key: &str| upper.lines().find_map(|line| line.trim().strip_prefix(key)).map(str::trim);
-    match (value("PROJECTION"), value("UNITS")) {
-        (Some("GEOGRAPHIC"), _) | (_, Some("DD")) => Some((Unit::Degrees, None)),
-        (Some(_), Some("FEET")) => Some((Unit::Metres(US_FOOT), None)),
-        (Some(_), _) => Some((Unit::Metres(1.0), None)),
-        _ => None,
-    }
-}
-
-/// Whether the name or code of a coordinate system (upper case) is web Mercator's.
-pub fn is_web_mercator(text: &str) -> bool {
-    let squeezed: String = text.chars().filter(|c| c.is_alphanumeric()).collect();
-    ["PSEUDOMERCATOR", "WEBMERCATOR", "EPSG3857", "EPSG900913"].iter().any(|name| squeezed.contains(name))
-}
-
-fn epsg(upper: &str) -> Option<String> {
-    let (_, code) = upper.rsplit_once("\"EPSG\",")?;
-    let digits: String = code.trim_start_matches('"').chars().take_while(char::is_ascii_digit).collect();
-    (!digits.is_empty()).then(|| format!("EPSG:{digits}"))
-}
-
-/// The factor of the outermost unit, which comes last.
-fn last_unit(upper: &str) -> Option<f64> {
-    let (_, unit) = upper.rsplit_once("UNIT[")?;
-    let number = unit.split([',', ']']).nth(1)?.trim().parse().ok()?;
-    (f64::is_finite(number) && number > 0.0).then_some(number)
 }

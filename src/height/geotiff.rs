@@ -8,8 +8,10 @@ use tiff::{
 use super::{
     Error, Holes, Samples, geokeys,
     load::{Options, Source},
+    metadata,
     raster::Raster,
     sample::{Order, SampleType},
+    sidecar::Georeference,
     terrain_rgb::{self, Encoding},
     tiff_directory,
 };
@@ -41,21 +43,18 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     }
 
     let Target { samples, holes, .. } = target;
-    let georeference = geokeys::read(&mut decoder, [w, h]);
-    let format = if georeference.place.is_some() { "GeoTIFF" } else { "TIFF" };
+    let mut warnings = Vec::new();
+    let (affine, crs) = geokeys::read(&mut decoder, &mut warnings);
+    let format = if affine.is_some() { "GeoTIFF" } else { "TIFF" };
     let sample_type = layout.encoding.map_or(layout.sample.name(), Encoding::name);
     let mut raster = Raster::new(format, sample_type, [w, h], samples);
     raster.holes = holes;
     raster.nodata = nodata(&mut decoder, name)?;
     raster.step = layout.encoding.map_or(1.0, Encoding::step);
-    raster.unit = georeference.height_unit;
-    raster.place = georeference.place;
-    raster.flip = georeference.flip;
-    raster.warnings = georeference.warnings;
-    let metadata = decoder.get_tag_ascii_string(Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
-    if ["role=\"scale\"", "role=\"offset\""].iter().any(|role| metadata.contains(role)) {
-        raster.warnings.push("GDAL_METADATA has a scale or offset, which is not applied: --height-scale".to_owned());
-    }
+    raster.warnings = warnings;
+    let metadata = decoder.get_tag_ascii_string(Tag::Unknown(GDAL_METADATA)).ok();
+    let band = metadata.map(|text| metadata::from_tag(&text, 1)).unwrap_or_default();
+    raster.georeference = Georeference { affine, crs, band };
     Ok(raster)
 }
 

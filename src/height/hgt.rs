@@ -35,7 +35,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     raster.place = Some(Place {
         origin: [lon, lat + 1.0],
         step: [1.0 / f64::from(side - 1); 2],
-        unit: Unit::Degrees,
+        unit: Unit::DEGREES,
         crs: Some("EPSG:4326".to_owned()),
     });
     Ok(raster)

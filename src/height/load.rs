@@ -6,7 +6,9 @@ use std::{
     path::Path,
 };
 
-use super::{Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, terrain_rgb, tiles, usgs_dem};
+use super::{
+    Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, sidecar, terrain_rgb, tiles, usgs_dem,
+};
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
 /// What is done with samples without data.
@@ -26,6 +28,8 @@ pub struct Options {
     pub spacing: Option<[f64; 2]>,
     /// Multiplies every height.
     pub height_scale: Option<f64>,
+    /// Added to every height after that, metres.
+    pub height_offset: f64,
     /// The value that means "no data", instead of what the file says.
     pub nodata: Option<f64>,
     /// The file is bare samples of this layout.
@@ -49,6 +53,7 @@ impl Default for Options {
         Self {
             spacing: None,
             height_scale: None,
+            height_offset: 0.0,
             nodata: None,
             raw: None,
             crop: None,
@@ -105,7 +110,7 @@ pub fn load_bytes(name: &str, bytes: &[u8], options: &Options) -> Result<Loaded,
 }
 
 /// Reads a file held in memory, of which `siblings` yields the file beside it with a given extension: `hdr`
-/// (header) and `prj` (projection).
+/// (header), `prj` (projection), `aux.xml` (band metadata) and those of world files.
 pub fn load_bytes_with(
     name: &str,
     bytes: &[u8],
@@ -254,8 +259,17 @@ impl Kind {
     }
 }
 
-/// Reads a source of a known format.
+/// Reads a source of a known format, and the files beside it.
 pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+    let mut raster = decode(source, kind, options)?;
+    // The member of an archive has been settled by the files beside it.
+    if !matches!(kind, Kind::Zip | Kind::Gzip) {
+        sidecar::settle(source, options, &mut raster);
+    }
+    Ok(raster)
+}
+
+fn decode(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
     match kind {
         Kind::Tiff => geotiff::read(source, options),
         Kind::Png => png::read(source, options),

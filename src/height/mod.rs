@@ -1,11 +1,13 @@
 //! Height data: a rectangular field of samples, where it lies, and where it has none.
 
+mod affine;
 mod archive;
 mod asc;
 pub mod bezier;
 mod bil;
 pub mod bounds;
 pub mod cave;
+mod crs;
 mod cuts;
 pub mod demo;
 mod envi;
@@ -17,6 +19,7 @@ pub(crate) mod kept;
 pub mod level_errors;
 pub mod levels;
 mod load;
+mod metadata;
 mod png;
 pub mod progress;
 mod raster;
@@ -25,13 +28,18 @@ mod replace;
 pub mod rtin;
 mod sample;
 pub mod save;
+mod sidecar;
 pub mod surface;
 pub mod synth;
 mod terrain_rgb;
 mod text;
 mod tiff_directory;
 mod tiles;
+mod units;
+mod unplaced;
 mod usgs_dem;
+mod wkt;
+mod world_file;
 
 pub use georef::metres_per_degree;
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
@@ -134,6 +142,20 @@ impl Samples {
             Samples::F32(heights) => heights.iter_mut().for_each(|h| *h *= factor),
             Samples::Coded { scale, .. } => *scale *= factor,
         }
+    }
+
+    /// Multiplies every height, and adds an offset. Codes stay codes where the offset is whole steps of them.
+    pub fn scale_and_shift(&mut self, factor: f64, offset: f64) {
+        if let Samples::Coded { zero, scale, .. } = self {
+            let step = (f64::from(*scale) * factor) as f32;
+            let moved = f64::from(*zero) - offset / f64::from(step);
+            if moved.fract() == 0.0 && moved.abs() <= f64::from(1 << 24) {
+                (*zero, *scale) = (moved as f32, step);
+                return;
+            }
+        }
+        let heights = (0..self.len()).map(|k| (f64::from(self.height(k)) * factor + offset) as f32).collect();
+        *self = Samples::F32(heights).compacted();
     }
 }
 

@@ -2,8 +2,11 @@
 
 use super::{
     Error, Field, Holes, Samples,
+    affine::Turn,
     georef::Place,
     load::{HoleFill, Loaded, Options},
+    sidecar::Georeference,
+    unplaced,
 };
 
 /// Samples as a file stores them, before crop, holes and metres.
@@ -22,12 +25,18 @@ pub(super) struct Raster {
     pub nodata: Option<f64>,
     /// Units a value counts.
     pub step: f64,
+    /// The band's own scale, which multiplies that.
+    pub scale: f64,
+    /// Added to the scaled value, units.
+    pub offset: f64,
     /// Metres a unit.
     pub unit: f64,
-    /// Where the samples lie once flipped.
+    /// Statements about position and units that are yet to be settled.
+    pub georeference: Georeference,
+    /// Position of the samples once turned.
     pub place: Option<Place>,
-    /// Whether the file's columns run west and its rows north.
-    pub flip: [bool; 2],
+    /// The turn that lays the file's samples north up.
+    pub turn: Turn,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -44,9 +53,12 @@ impl Raster {
             holes,
             nodata: None,
             step: 1.0,
+            scale: 1.0,
+            offset: 0.0,
             unit: 1.0,
+            georeference: Georeference::default(),
             place: None,
-            flip: [false; 2],
+            turn: Turn::default(),
             warnings: Vec::new(),
         }
     }
@@ -58,7 +70,8 @@ impl Raster {
         let range = self.check_range();
         self.blank_holes(range);
         self.samples = self.samples.compacted();
-        self.scale(name, options, range)?;
+        self.assume_scale(options, range);
+        self.to_metres(name, options, range)?;
         let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
         let (spacing, origin) = self.lie(name, options)?;
         let tiles = tiles(name, self.size, options)?;
@@ -75,19 +88,22 @@ impl Raster {
 
     /// Crops, and turns the rows to run from north to south and the columns from west to east.
     fn rearrange(&mut self, name: &str, options: &Options) -> Result<(), Error> {
-        let [w, h] = self.size;
+        let Turn { transposed, flip } = self.turn;
+        let [w, h] = if transposed { [self.size[1], self.size[0]] } else { self.size };
         let [x, z, crop_w, crop_h] = options.crop.unwrap_or([0, 0, w, h]);
         let fits = |at: u32, n: u32, side: u32| n >= 2 && at.checked_add(n).is_some_and(|end| end <= side);
         if !fits(x, crop_w, w) || !fits(z, crop_h, h) {
             let what = format!("expected at least 2x2 samples within {w}x{h}, found {crop_w}x{crop_h} at {x},{z}");
             return Err(Error::new(name, "--crop", what));
         }
-        if [x, z, crop_w, crop_h] == [0, 0, w, h] && self.flip == [false; 2] {
+        if [x, z, crop_w, crop_h] == [0, 0, w, h] && self.turn == Turn::default() {
             return Ok(());
         }
+        // Samples of the file from one column, and from one row, to the next.
+        let stride = if transposed { [self.size[0] as usize, 1] } else { [1, self.size[0] as usize] };
         let source = |n: u32, side: u32, flip: bool| if flip { side - 1 - n } else { n } as usize;
-        let columns: Vec<usize> = (x..x + crop_w).map(|i| source(i, w, self.flip[0])).collect();
-        let rows = (z..z + crop_h).map(|j| source(j, h, self.flip[1]) * w as usize);
+        let columns: Vec<usize> = (x..x + crop_w).map(|i| source(i, w, flip[0]) * stride[0]).collect();
+        let rows = (z..z + crop_h).map(|j| source(j, h, flip[1]) * stride[1]);
         let order = rows.flat_map(|row| columns.iter().map(move |column| row + column));
 
         let mut holes = Holes::none(crop_w as usize * crop_h as usize);
@@ -170,15 +186,34 @@ impl Raster {
         }
     }
 
-    /// Turns values into metres.
-    fn scale(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
-        let factor = (self.step * self.unit * options.height_scale.unwrap_or(1.0)) as f32;
-        if !factor.is_finite() || factor == 0.0 || range.iter().any(|value| !(value * factor).is_finite()) {
-            let what = format!("expected heights that stay finite, found {range:?} times {factor}");
+    /// Warns where nothing states spacing or scale, and makes up a scale where values cannot be metres.
+    fn assume_scale(&mut self, options: &Options, range: [f32; 2]) {
+        if self.place.is_some() || options.spacing.is_some() {
+            return;
+        }
+        let has_scale = self.scale != 1.0 || self.unit != 1.0 || options.height_scale.is_some();
+        if let Some(unplaced::Assumed { scale, warning }) =
+            unplaced::assume(self.format, &self.sample_type, self.size, range, has_scale)
+        {
+            self.scale *= scale;
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Turns values into metres: (value · scale + offset) · unit · `--height-scale` + `--height-offset`.
+    fn to_metres(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
+        let unit = self.unit * options.height_scale.unwrap_or(1.0);
+        let (factor, offset) = (self.step * self.scale * unit, self.offset * unit + options.height_offset);
+        let is_finite = |value: f64| (value as f32).is_finite();
+        let stays = |value: f32| is_finite(f64::from(value) * factor + offset);
+        if !is_finite(factor) || factor as f32 == 0.0 || !is_finite(offset) || !range.into_iter().all(stays) {
+            let what = format!("expected heights that stay finite, found {range:?} times {factor} plus {offset}");
             return Err(Error::new(name, "--height-scale", what));
         }
-        if factor != 1.0 {
-            self.samples.multiply(factor);
+        if offset != 0.0 {
+            self.samples.scale_and_shift(factor, offset);
+        } else if factor != 1.0 {
+            self.samples.multiply(factor as f32);
         }
         Ok(())
     }

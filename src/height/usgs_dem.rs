@@ -7,6 +7,7 @@ use std::io::SeekFrom;
 
 use super::{
     Error, Holes, Samples,
+    crs::{self, Crs},
     georef::{FOOT, Place, Unit},
     load::{Options, Source},
     raster::Raster,
@@ -65,13 +66,23 @@ impl Header {
         plausible.then_some(header)
     }
 
-    fn crs(&self) -> Option<String> {
-        let (geographic, utm) = match self.datum {
+    /// EPSG codes of the datum's geographic system and of its UTM zone 0.
+    fn codes(&self) -> (u32, i32) {
+        match self.datum {
             2 => (4322, 32200),
             3 => (4326, 32600),
             4 => (4269, 26900),
             _ => (4267, 26700),
-        };
+        }
+    }
+
+    /// Degrees on the ellipsoid of the datum.
+    fn angles(&self) -> Unit {
+        crs::from_epsg(self.codes().0).and_then(|crs| crs.unit).unwrap_or(Unit::DEGREES)
+    }
+
+    fn crs(&self) -> Option<String> {
+        let (geographic, utm) = self.codes();
         match self.system {
             0 => Some(format!("EPSG:{geographic}")),
             1 if (1..=60).contains(&self.zone) => Some(format!("EPSG:{}", utm + self.zone)),
@@ -157,7 +168,8 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let mut raster = Raster::new("USGS DEM", "text", size.map(|n| n as u32), Samples::F32(heights));
     raster.holes = holes;
     raster.step = header.step[2];
-    raster.unit = if header.height_unit == 1 { FOOT } else { 1.0 };
+    let height_unit = Some(if header.height_unit == 1 { FOOT } else { 1.0 });
+    raster.georeference.crs = Some(Crs { height_unit, ..Crs::default() });
     raster.place = Some(place(&header, [low[0], high[1]]));
     Ok(raster)
 }
@@ -165,10 +177,10 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
 /// The place of a grid whose north-west sample is at a position in steps.
 fn place(header: &Header, corner: [f64; 2]) -> Place {
     let (unit, factor) = match header.ground_unit {
-        0 => (Unit::Degrees, 1f64.to_degrees()),
+        0 => (header.angles(), 1f64.to_degrees()),
         1 => (Unit::Metres(FOOT), 1.0),
         2 => (Unit::Metres(1.0), 1.0),
-        _ => (Unit::Degrees, 1.0 / 3600.0),
+        _ => (header.angles(), 1.0 / 3600.0),
     };
     let step = [header.step[0] * factor, header.step[1] * factor];
     Place { origin: [corner[0] * step[0], corner[1] * step[1]], step, unit, crs: header.crs() }

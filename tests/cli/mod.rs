@@ -86,6 +86,8 @@ fn options_change_what_is_read() {
     let arguments =
         ["info", "demo", "--crop", "100,200,30,20", "--spacing", "7,9", "--height-scale", "2", "--tile", "2,3"];
     let info = json(folder.path(), &arguments);
+    let lowered = json(folder.path(), &[&arguments[..], &["--height-offset", "-5"]].concat());
+    assert!((lowered["max_m"].as_f64().unwrap() + 5.0 - info["max_m"].as_f64().unwrap()).abs() < 1e-3);
     assert_eq!((info["width"].as_u64(), info["height"].as_u64()), (Some(60), Some(60)));
     assert_eq!(
         info["spacing_m"].as_array().map(|s| s.iter().map(|v| v.as_f64().unwrap()).collect()),

@@ -17,8 +17,9 @@ fn expected([w, h]: [usize; 2], value: impl Fn(usize, usize) -> f64) -> Vec<f32>
     (0..h).flat_map(|j| (0..w).map(|i| value(i, j) as f32).collect::<Vec<_>>()).collect()
 }
 
+/// Reads values as metres: pictures of codes would get a scale.
 fn load(name: &str, bytes: &[u8]) -> Loaded {
-    load_bytes(name, bytes, &Options::default()).unwrap()
+    load_bytes(name, bytes, &Options { height_scale: Some(1.0), ..Options::default() }).unwrap()
 }
 
 #[test]

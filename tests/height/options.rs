@@ -55,7 +55,8 @@ fn undeclared_nodata_is_named() {
     for (bits, format, value) in
         [(16, 2, -32768.0), (16, 2, -32767.0), (16, 2, -9999.0), (16, 1, 65535.0), (32, 3, -9999.0), (32, 3, 1e38)]
     {
-        let loaded = load(&TiffFile::new(SIZE, bits, format), with(value), &Options::default());
+        let options = Options { spacing: Some([1.0; 2]), ..Options::default() };
+        let loaded = load(&TiffFile::new(SIZE, bits, format), with(value), &options);
         let [warning] = &loaded.warnings[..] else { panic!("{value}: {:?}", loaded.warnings) };
         let flag = format!("--nodata {}", f64::from(value as f32));
         assert!(warning.starts_with("2 samples") && warning.contains(&flag), "{warning}");
