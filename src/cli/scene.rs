@@ -62,6 +62,9 @@ pub struct ReadArgs {
     /// How a colour picture encodes heights: terrarium or mapbox.
     #[arg(long, value_name = "E", value_parser = encoding)]
     pub encoding: Option<Encoding>,
+    /// The band to read of a file of several, from 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub band: Option<u32>,
     /// Zoom level of a tile directory.
     #[arg(long)]
     pub zoom: Option<u32>,
@@ -299,6 +302,7 @@ impl ReadArgs {
             tiles: self.tile,
             hole_fill: self.hole_fill,
             encoding: self.encoding,
+            band: self.band,
             zoom: self.zoom,
             max_samples: self.max_samples,
         };

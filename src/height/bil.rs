@@ -9,6 +9,7 @@ use super::{
     Error, asc, envi,
     georef::{Grid, Place, Unit},
     load::{Options, Source},
+    nodata,
     raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
@@ -44,7 +45,8 @@ pub(super) struct Header {
     pub start: u64,
     /// Bytes from one row to the next, if not those of its samples.
     pub stride: Option<u64>,
-    pub nodata: Option<f64>,
+    /// The text that declares the value for "no data".
+    pub nodata: Option<String>,
     /// Where the samples lie.
     pub grid: Option<Grid>,
     /// Unit and name of the coordinate system.
@@ -68,12 +70,16 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     }
     let rows = Rows { sample: header.sample, order: header.order, start: header.start, stride };
     let mut raster = Raster::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
-    raster.nodata = header.nodata;
+    if let Some(text) = &header.nodata {
+        raster.declare_nodata("header NODATA", text, options);
+    }
     if let Some((origin, step)) = header.grid {
-        (raster.place, raster.warnings) = match header.system {
+        let (place, warnings) = match header.system {
             Some((unit, crs)) => (Some(Place { origin, step, unit, crs }), Vec::new()),
             None => asc::place(source, (origin, step), size),
         };
+        raster.place = place;
+        raster.warnings.extend(warnings);
     }
     Ok(raster)
 }
@@ -119,11 +125,8 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
             return Err(values.error("BYTEORDER", format!("expected I, M, LSBFIRST or MSBFIRST, found {other}")));
         }
     };
-    let nodata = match values.number("nodata_value")? {
-        None => values.number("nodata")?,
-        nodata => nodata,
-    };
-    let sample = sample(&values, nodata)?;
+    let nodata = values.text("nodata_value").or(values.text("nodata"));
+    let sample = sample(&values, nodata.and_then(nodata::number))?;
     let size: [u64; 2] = [values.required("ncols")?, values.required("nrows")?];
     Ok(Header {
         format: if sample == SampleType::F32 { "ESRI FLT" } else { "ESRI BIL" },
@@ -132,7 +135,7 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
         order,
         start: values.number("skipbytes")?.unwrap_or(0),
         stride: values.number("totalrowbytes")?,
-        nodata,
+        nodata: nodata.map(str::to_owned),
         grid: grid(&values, size)?,
         system: None,
     })

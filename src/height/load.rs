@@ -38,6 +38,8 @@ pub struct Options {
     pub hole_fill: HoleFill,
     /// How a colour picture encodes heights.
     pub encoding: Option<Encoding>,
+    /// The band of a file of several, from 1; by default the first, or the colours of a picture.
+    pub band: Option<u32>,
     /// Zoom level of a tile directory; by default the highest complete one.
     pub zoom: Option<u32>,
     /// Files that claim more samples are refused.
@@ -55,6 +57,7 @@ impl Default for Options {
             tiles: None,
             hole_fill: HoleFill::No,
             encoding: None,
+            band: None,
             zoom: None,
             max_samples: 1 << 30,
         }
@@ -256,6 +259,11 @@ impl Kind {
 
 /// Reads a source of a known format.
 pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+    if let Some(band) = options.band.filter(|&band| band != 1)
+        && !matches!(kind, Kind::Tiff | Kind::Zip | Kind::Gzip)
+    {
+        return Err(source.error("--band", format!("expected 1, the only band of this format, found {band}")));
+    }
     match kind {
         Kind::Tiff => geotiff::read(source, options),
         Kind::Png => png::read(source, options),
