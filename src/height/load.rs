@@ -214,6 +214,16 @@ pub(super) fn samples(name: &str, [w, h]: [u64; 2], options: &Options) -> Result
     }
 }
 
+/// Refuses another band than the first, for formats that have no other.
+pub(super) fn one_band(name: &str, options: &Options) -> Result<(), Error> {
+    match options.band {
+        None | Some(1) => Ok(()),
+        Some(band) => {
+            Err(Error::new(name, "--band", format!("expected 1, the only band of this format, found {band}")))
+        }
+    }
+}
+
 /// Bytes looked at to tell the format.
 pub(super) const HEAD_BYTES: u64 = 4096;
 
@@ -259,10 +269,8 @@ impl Kind {
 
 /// Reads a source of a known format.
 pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
-    if let Some(band) = options.band.filter(|&band| band != 1)
-        && !matches!(kind, Kind::Tiff | Kind::Zip | Kind::Gzip)
-    {
-        return Err(source.error("--band", format!("expected 1, the only band of this format, found {band}")));
+    if !matches!(kind, Kind::Tiff | Kind::Zip | Kind::Gzip) {
+        one_band(source.name, options)?;
     }
     match kind {
         Kind::Tiff => geotiff::read(source, options),

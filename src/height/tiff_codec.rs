@@ -1,7 +1,6 @@
 //! The compressions of TIFF: each chunk is unpacked to its end, so that every checksum it has is compared.
 
 use flate2::{Decompress, FlushDecompress, Status};
-use tiff::tags::CompressionMethod;
 use weezl::{BitOrder, LzwStatus, decode::Configuration};
 
 /// A compression that is read.
@@ -14,15 +13,25 @@ pub(super) enum Codec {
     Zstd,
 }
 
-/// Compressions that the `tiff` crate has no name for.
-const OTHERS: [(u64, &str); 9] = [
+/// Names of the other compressions in use.
+const OTHERS: [(u64, &str); 19] = [
+    (2, "CCITT RLE"),
+    (3, "CCITT group 3"),
+    (4, "CCITT group 4"),
+    (6, "JPEG (old)"),
+    (7, "JPEG"),
     (34661, "JBIG"),
     (34676, "SGI LogLuv"),
+    (34677, "SGI LogLuv"),
     (34712, "JPEG 2000"),
     (34887, "LERC"),
+    (34892, "JPEG (lossy DNG)"),
     (34925, "LZMA"),
-    (34926, "ZSTD (an early code)"),
-    (34927, "WebP (an early code)"),
+    (34926, "ZSTD (early code)"),
+    (34927, "WebP (early code)"),
+    (34933, "PNG"),
+    (34934, "JPEG XR"),
+    (50001, "WebP"),
     (50002, "JPEG XL"),
     (52546, "JPEG XL"),
 ];
@@ -33,19 +42,14 @@ const PADDING: usize = 3;
 impl Codec {
     /// The codec of a compression code, or what was expected.
     pub fn of(code: u64) -> Result<Self, String> {
-        let method = u16::try_from(code).map(CompressionMethod::from_u16_exhaustive);
-        match method {
-            Ok(CompressionMethod::None) => Ok(Codec::None),
-            Ok(CompressionMethod::LZW) => Ok(Codec::Lzw),
-            Ok(CompressionMethod::Deflate | CompressionMethod::OldDeflate) => Ok(Codec::Deflate),
-            Ok(CompressionMethod::PackBits) => Ok(Codec::PackBits),
-            Ok(CompressionMethod::ZSTD) => Ok(Codec::Zstd),
+        match code {
+            1 => Ok(Codec::None),
+            5 => Ok(Codec::Lzw),
+            8 | 32946 => Ok(Codec::Deflate),
+            32773 => Ok(Codec::PackBits),
+            50000 => Ok(Codec::Zstd),
             _ => {
-                let other = OTHERS.iter().find(|(other, _)| *other == code).map(|(_, name)| (*name).to_owned());
-                let found = other.unwrap_or_else(|| match method {
-                    Ok(CompressionMethod::Unknown(_)) | Err(_) => "an unknown one".to_owned(),
-                    Ok(method) => format!("{method:?}"),
-                });
+                let found = OTHERS.iter().find(|(other, _)| *other == code).map_or("an unknown one", |(_, name)| name);
                 Err(format!("expected none, LZW, Deflate, ZSTD or PackBits, found {found} (code {code})"))
             }
         }
@@ -77,7 +81,7 @@ impl Codec {
             Codec::Lzw => (lzw(&packed, most)?, Vec::new()),
             Codec::Deflate => inflate(&packed, most)?,
             Codec::PackBits => pack_bits(&packed, most)?,
-            Codec::Zstd => (zstd::bulk::decompress(&packed, most).map_err(|e| e.to_string())?, Vec::new()),
+            Codec::Zstd => (unzstd(&packed, most)?, Vec::new()),
         };
         if bytes.len() < least {
             return Err(format!("expected {least} bytes, found the end of the data after {}", bytes.len()));
@@ -100,6 +104,11 @@ fn inflate(packed: &[u8], most: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
         _ if bytes.len() > most => Err(format!("expected at most {most} bytes, found more")),
         _ => Err(format!("expected the end of a zlib stream, found the end of the data after {} bytes", bytes.len())),
     }
+}
+
+/// Unpacks the frames of ZSTD, which must end where the data do.
+fn unzstd(packed: &[u8], most: usize) -> Result<Vec<u8>, String> {
+    zstd::bulk::decompress(packed, most).map_err(|e| format!("expected whole ZSTD frames of at most {most} bytes: {e}"))
 }
 
 /// Unpacks LZW. Writers may leave out the end code, or write it a bit too short where the code width changes: data that

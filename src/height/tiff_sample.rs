@@ -104,9 +104,9 @@ impl Packing {
             if bits == 8 * bytes {
                 samples.extend(&row[at / 8..at / 8 + bytes]);
             } else {
-                let number = match (self.kind, bits) {
-                    ('f', _) => u64::from(triple(little(&row[at / 8..at / 8 + 3]) as u32).to_bits()),
-                    (_, 24) => little(&row[at / 8..at / 8 + 3]),
+                let number = match self.kind {
+                    'f' => u64::from(triple(little(&row[at / 8..at / 8 + 3]) as u32).to_bits()),
+                    // Integers of 24 bits too have their highest bits first where the file is little-endian: so GDAL writes.
                     _ => bits_at(row, at, bits),
                 };
                 let shift = 64 - bits;

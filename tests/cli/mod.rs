@@ -1,6 +1,7 @@
 //! The program, run as a person runs it.
 
 mod endless;
+mod numbers;
 mod robust;
 #[cfg(feature = "vulkan")]
 mod with_a_device;
