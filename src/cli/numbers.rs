@@ -13,7 +13,7 @@ pub fn with_negative(command: Command) -> Command {
     names.into_iter().fold(command, |command, name| command.mut_subcommand(name, with_negative))
 }
 
-/// Whether a flag takes numbers, and always at least one.
+/// Returns true for a flag that takes numbers, at least one.
 fn is_number(arg: &Arg) -> bool {
     let kinds = [
         TypeId::of::<f64>(),

@@ -16,9 +16,9 @@ pub(super) struct Bands {
     values: Vec<usize>,
     /// Where it is 0 there is no data.
     alpha: Option<usize>,
-    /// How the colours encode heights.
+    /// The encoding of heights in the colours.
     pub encoding: Option<Encoding>,
-    /// What the user should know about the choice.
+    /// A warning about the choice.
     pub warning: Option<String>,
 }
 

@@ -32,23 +32,23 @@ pub(super) struct Chunk {
 pub(super) struct Layout {
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// How a row of samples is packed.
+    /// The packing of a row of samples.
     pub packing: Packing,
     /// Samples a pixel.
     pub bands: usize,
     /// The band that is the pixels' opacity.
     pub alpha: Option<usize>,
-    /// Whether each band has chunks of its own.
+    /// True if each band has chunks of its own.
     pub is_planar: bool,
-    /// Whether pixels are indices into a table of colours.
+    /// True if pixels are indices into a table of colours.
     pub is_palette: bool,
     pub codec: Codec,
-    /// Whether the bits of each byte are stored from the lowest to the highest.
+    /// True if the bits of each byte are stored from the lowest to the highest.
     pub is_bit_reversed: bool,
     /// Columns and rows of a full chunk.
     pub chunk_size: [usize; 2],
     pub chunks: Vec<Chunk>,
-    /// What a chunk is called.
+    /// The word for a chunk: strip or tile.
     pub chunk_name: &'static str,
 }
 
@@ -197,7 +197,7 @@ impl Tags<'_> {
     }
 }
 
-/// How rows are packed, from tags about samples and prediction.
+/// The packing of rows, from the tags about samples and prediction.
 fn packing(tags: &mut Tags, order: Order, stride: usize) -> Result<Packing, Error> {
     let bits = tags.numbers(Tag::BitsPerSample)?;
     let formats = tags.numbers(Tag::SampleFormat)?;

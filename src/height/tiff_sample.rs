@@ -2,7 +2,7 @@
 
 use super::sample::{Order, SampleType};
 
-/// How the samples of a row lie in its bytes.
+/// The layout of samples within the bytes of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packing {
     /// The type that samples become: the next one of whole bytes.
@@ -92,7 +92,7 @@ impl Packing {
         }
     }
 
-    /// Whether decoded rows are samples of one band as they are stored.
+    /// Returns true where decoded rows need no extraction: one band of whole bytes.
     pub fn is_plain(&self) -> bool {
         self.stride == 1 && self.bits == 8 * self.sample.bytes()
     }

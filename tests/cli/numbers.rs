@@ -97,7 +97,7 @@ fn negative_scales_and_gdalinfo_pixel_sizes() {
     }
 }
 
-/// Whatever the file holds, an error names only flags that are on the command line.
+/// An error names only flags that are on the command line, for any content of the file.
 #[test]
 fn no_error_names_a_flag_that_was_not_given() {
     let folder = folder();

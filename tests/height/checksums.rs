@@ -1,7 +1,7 @@
 //! One flipped bit is found wherever a format has a checksum.
 //!
 //! PNG has a CRC-32 for each chunk and an Adler-32 for its data; gzip and zip have a CRC-32 of what they hold; Deflate in TIFF has
-//! an Adler-32 for each strip or tile, and ZSTD in TIFF an XXH64 where the writer asks for it, as libtiff does not. The tags
+//! an Adler-32 for each strip or tile, and ZSTD in TIFF an XXH64 if the writer adds it; libtiff does not. The tags
 //! of a TIFF, its uncompressed, LZW and PackBits data, and ZSTD without a checksum have none: there a flip may stay unseen.
 
 use std::ops::Range;
@@ -46,7 +46,7 @@ impl File {
         Some(load_bytes(self.name, bytes, &self.options).ok()?.field.samples().clone())
     }
 
-    /// How many flips of single bits are refused, change nothing, and change heights.
+    /// Counts flips of single bits that are refused, change nothing, and change heights.
     fn flipped(&self, flips: impl Iterator<Item = (usize, u8)>) -> [usize; 3] {
         let same = self.load(&self.bytes).expect("the file itself is read");
         let (mut bytes, mut counts) = (self.bytes.clone(), [0; 3]);

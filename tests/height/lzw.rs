@@ -7,7 +7,7 @@ use super::tiff_file::{LZW, NONE, TiffFile};
 const CLEAR: u32 = 256;
 const END: u32 = 257;
 
-/// How a writer ends its data.
+/// The end of a writer's data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum End {
     /// With an end code as wide as the next code.

@@ -1,4 +1,4 @@
-//! Bands of a TIFF: which one is read, and which say where there is no data.
+//! Bands of a TIFF: heights, colours, opacity and masks.
 
 use cuesta::height::{Encoding, Loaded, Options, load_bytes};
 
@@ -25,7 +25,7 @@ fn value(i: usize, j: usize, band: usize) -> f64 {
 }
 
 #[test]
-fn the_band_that_is_asked_for() {
+fn each_band_by_its_number() {
     for (bands, bits, predictor) in [(2, 16, 1), (3, 16, 2), (5, 32, 3), (7, 12, 1), (5, 8, 1)] {
         let format = if bits == 32 { 3 } else { 1 };
         for file in layouts(&TiffFile { bands, predictor, ..TiffFile::new(SIZE, bits, format) }) {
@@ -53,7 +53,7 @@ fn the_band_that_is_asked_for() {
     }
 }
 
-/// A picture of colours asks what they mean, whatever its layout; a band of it may be read too.
+/// A picture of colours needs an encoding in every layout; one of its bands may be read too.
 #[test]
 fn colours() {
     let encoding: Encoding = "terrarium".parse().unwrap();

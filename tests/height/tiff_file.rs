@@ -15,13 +15,13 @@ pub struct TiffFile {
     pub bits: u16,
     pub format: u16,
     pub bands: usize,
-    /// Whether each band has chunks of its own.
+    /// True if each band has chunks of its own.
     pub planar: bool,
     /// Bytes before the file's first: where it is appended to another.
     pub base: usize,
     /// Bytes after the data of each chunk.
     pub padding: Vec<u8>,
-    /// Whether ZSTD data are compressed, with a checksum.
+    /// True if ZSTD data are compressed, with a checksum.
     pub checksum: bool,
     /// Further tags: doubles, shorts or text.
     pub tags: Vec<(u16, Tag)>,
