@@ -152,7 +152,7 @@ impl Raster {
     fn scale(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
         let own = self.step * self.unit;
         let factor = (own * options.height_scale.unwrap_or(1.0)) as f32;
-        let is_far = |value: f32, factor: f64| !((f64::from(value) * factor).abs() <= FARTHEST_M);
+        let is_far = |value: f32, factor: f64| !(0.0..=FARTHEST_M).contains(&(f64::from(value) * factor).abs());
         if let Some(far) = range.into_iter().find(|&value| is_far(value, own)) {
             let far = f64::from(far) * self.step;
             let what = format!("expected at most 1e12 m, found {far:e}; --nodata {far:e} makes it a hole");
