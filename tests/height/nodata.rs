@@ -1,6 +1,6 @@
 //! What means "no data": texts of files, and values that are no heights.
 
-use cuesta::height::{Loaded, Options, load_bytes, load_bytes_with};
+use cuesta::height::{Loaded, Options, Samples, load_bytes, load_bytes_with};
 
 use super::tiff_file::{Tag, TiffFile};
 use super::tiny::{self, SIZE};
@@ -99,6 +99,8 @@ fn a_negative_scale() {
         let loaded = load_bytes("depth.tif", &file.bytes(tiny::height), &options).unwrap();
         let field = &loaded.field;
         assert!(field.is_hole(0, 0) && loaded.exact_in_16_bit);
+        // Codes rise with the heights.
+        assert!(matches!(field.samples(), Samples::Coded { scale: 0.5, .. }), "{bits} {format}");
         for (i, j) in [(1, 0), (4, 3), (2, 2)] {
             assert_eq!(f64::from(field.height(i, j)), tiny::height(i as usize, j as usize) * -0.5);
         }
