@@ -10,7 +10,7 @@ use crate::height::{
 };
 
 /// A command line that has all that a subcommand needs.
-fn words<'a>(subcommand: &clap::Command, more: &[&'a str]) -> Vec<String> {
+fn words(subcommand: &clap::Command, more: &[&str]) -> Vec<String> {
     let mut words = vec!["cuesta".to_string(), subcommand.get_name().to_string()];
     let is_needed = |arg: &&clap::Arg| arg.is_required_set() || arg.get_id() == "terrain";
     for arg in subcommand.get_arguments().filter(is_needed) {
