@@ -12,7 +12,7 @@ use super::{Common, endless, report};
 use crate::bench::held::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
-use crate::lod::{self, Settings};
+use crate::lod;
 
 /// Frames drawn before a path begins.
 const WARM_UP: usize = 5;
@@ -129,7 +129,7 @@ fn asked(common: &Common, name: &str, choices: &[(String, String)]) -> Result<Ve
         all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
     }
     let checked = |own: Vec<(String, String)>| {
-        let settings = Settings::new(entry, variant, &own).map_err(|what| anyhow!("--technique {name}: {what}"))?;
+        let settings = super::scene::settings(entry, variant, &own)?;
         report::warn_of_idle(common, entry, &settings);
         Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
     };

@@ -6,6 +6,7 @@ pub mod endless;
 pub mod export;
 pub mod info;
 pub mod interrupt;
+pub mod numbers;
 pub mod plan;
 #[cfg(feature = "vulkan")]
 pub mod profile;
@@ -21,11 +22,12 @@ pub mod view;
 pub mod whole;
 pub mod working_set;
 
+use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
 use anyhow::{Result, anyhow};
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Large terrain drawn with a bounded error.
 #[derive(Parser, Debug)]
@@ -88,6 +90,15 @@ pub enum Command {
     Synth(synth::SynthArgs),
 }
 
+impl Cli {
+    /// Parses a command line, the program's name first.
+    pub fn parse_words(words: impl IntoIterator<Item: Into<OsString> + Clone>) -> Result<Self, clap::Error> {
+        let mut command = command();
+        let matches = command.try_get_matches_from_mut(words)?;
+        Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+    }
+}
+
 /// How a run ended, if it did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -101,7 +112,7 @@ pub enum Outcome {
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(fault));
     interrupt::install();
-    let outcome = match Cli::try_parse() {
+    let outcome = match Cli::parse_words(std::env::args_os()) {
         Ok(cli) => match panic::catch_unwind(AssertUnwindSafe(|| run(cli))) {
             Ok(outcome) => outcome,
             // The hook has told of it.
@@ -167,17 +178,17 @@ fn without_subcommand(common: &Common) -> Result<Outcome> {
 /// Runs a subcommand given as words, under the flags that were given.
 #[cfg(feature = "vulkan")]
 fn run_words(common: &Common, words: &[&str]) -> Result<Outcome> {
-    let cli = Cli::try_parse_from(std::iter::once(&"cuesta").chain(words))?;
+    let cli = Cli::parse_words(std::iter::once(&"cuesta").chain(words))?;
     run(Cli { common: common.clone(), ..cli })
 }
 
 #[cfg(not(feature = "vulkan"))]
 fn without_subcommand(_: &Common) -> Result<Outcome> {
-    report::say(Cli::command().render_help())?;
+    report::say(command().render_help())?;
     Ok(Outcome::Done)
 }
 
 /// The command line's own description, for tests that hold documents against it.
 pub fn command() -> clap::Command {
-    Cli::command()
+    numbers::with_negative(Cli::command())
 }

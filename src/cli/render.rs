@@ -43,7 +43,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub look: LookArgs,
     /// Seconds since the sun stood where `--sun` says.
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub time: f64,
     /// Draw it so often and report the median times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
+use super::numbers::{nodata, numbers, spacing};
 use super::whole::Whole;
 use super::{Common, endless, report};
 use crate::height::cave::Cave;
@@ -35,7 +36,7 @@ pub struct TerrainArgs {
 #[derive(Args, Debug, Clone)]
 pub struct ReadArgs {
     /// Distance of neighbouring samples, metres, instead of what the file says.
-    #[arg(long, value_name = "DX[,DZ]", value_parser = pair_or_one)]
+    #[arg(long, value_name = "DX[,DZ]", value_parser = spacing)]
     pub spacing: Option<[f64; 2]>,
     /// Multiplies every height.
     #[arg(long, value_name = "S")]
@@ -44,7 +45,7 @@ pub struct ReadArgs {
     #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = 0.0)]
     pub height_offset: f64,
     /// The value that means "no data", instead of what the file says.
-    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    #[arg(long, value_name = "V", value_parser = nodata)]
     pub nodata: Option<f64>,
     /// The file is bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
     #[arg(long, value_name = "LAYOUT")]
@@ -65,6 +66,9 @@ pub struct ReadArgs {
     /// How a colour picture encodes heights: terrarium or mapbox.
     #[arg(long, value_name = "E", value_parser = encoding)]
     pub encoding: Option<Encoding>,
+    /// The band to read of a file of several, from 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub band: Option<u32>,
     /// Zoom level of a tile directory.
     #[arg(long)]
     pub zoom: Option<u32>,
@@ -86,13 +90,13 @@ pub struct ViewArgs {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch"])]
     pub look: Option<String>,
     /// Heading, degrees: 0 = east, 90 = south.
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     pub yaw: Option<f64>,
     /// Degrees above the horizon.
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     pub pitch: Option<f64>,
     /// Degrees clockwise.
-    #[arg(long, value_name = "D", allow_negative_numbers = true, default_value_t = 0.0)]
+    #[arg(long, value_name = "D", default_value_t = 0.0)]
     pub roll: f64,
     /// Horizontal field of view, degrees.
     #[arg(long, value_name = "D", default_value_t = 60.0)]
@@ -139,7 +143,7 @@ pub struct LookArgs {
     #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
-    #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>)]
     pub sun: Option<[f64; 2]>,
     /// Optical density of the fog per metre.
     #[arg(long, value_name = "DENSITY", default_value_t = 0.0)]
@@ -160,7 +164,7 @@ pub struct GroundArgs {
     pub detail: bool,
     /// Degrees by which the sun's azimuth goes on a second: of the window's time, of a path's at 60 frames a second, of
     /// `--time` in a picture.
-    #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0)]
     pub sun_speed: f64,
     /// Keep features that the scene does not need: see `info --plan`.
     #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
@@ -234,24 +238,10 @@ fn technique_help() -> String {
     format!("Technique, or technique:variant: {}", names.collect::<Vec<_>>().join(", "))
 }
 
-fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
-    let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    let found = text.split(',').count();
-    if found != parts.len() {
-        return Err("expected numbers separated by commas".to_string());
-    }
-    parts.try_into().map_err(|_| format!("expected {N} numbers separated by commas, found {found}"))
-}
-
-fn pair_or_one(text: &str) -> Result<[f64; 2], String> {
-    let pair = numbers::<f64, 2>(text).or_else(|_| numbers::<f64, 1>(text).map(|[s]| [s, s]))?;
-    if pair.iter().all(|&s| is_length(s)) { Ok(pair) } else { Err(format!("expected {LENGTHS}")) }
-}
-
 /// What [`is_length`] takes.
-const LENGTHS: &str = "1e-9 to 1e12 metres";
+pub(super) const LENGTHS: &str = "1e-9 to 1e12 metres";
 
-fn is_length(metres: f64) -> bool {
+pub(super) fn is_length(metres: f64) -> bool {
     (FINEST..=FARTHEST_M).contains(&metres)
 }
 
@@ -303,6 +293,7 @@ impl ReadArgs {
             tiles: self.tile,
             hole_fill: self.hole_fill,
             encoding: self.encoding,
+            band: self.band,
             zoom: self.zoom,
             max_samples: self.max_samples,
         };
@@ -399,6 +390,14 @@ fn read_picture(path: &str) -> Result<image::RgbaImage> {
     Ok(reader.decode().map_err(|e| fail(&e))?.into_rgba8())
 }
 
+/// Settings of a technique, with errors that name the flag at fault.
+pub(super) fn settings(entry: &lod::Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Settings> {
+    Settings::new(entry, variant, choices).map_err(|what| {
+        let is_variant = variant.is_some_and(|name| entry.variants.iter().all(|variant| variant.name != name));
+        anyhow!("{}: {what}", if is_variant { "--technique" } else { "--set" })
+    })
+}
+
 impl TechniqueArgs {
     /// The table's row, and the settings for it.
     pub fn settings(&self) -> Result<(&'static lod::Entry, Settings)> {
@@ -410,8 +409,7 @@ impl TechniqueArgs {
             let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
             anyhow!("--technique {name}: expected one of {}", known.join(", "))
         })?;
-        let settings = Settings::new(entry, variant, &self.settings).map_err(|e| anyhow!("--set: {e}"))?;
-        Ok((entry, settings))
+        Ok((entry, settings(entry, variant, &self.settings)?))
     }
 
     /// The technique, prepared for the field.
@@ -452,10 +450,11 @@ impl ViewArgs {
             (None, yaw, pitch) => View::turned(yaw.unwrap_or(-90.0), pitch.unwrap_or(0.0), self.roll),
         };
         let above = eye.y - field.height_at(eye.x, eye.z).unwrap_or(whole.centre.y);
-        let near = self.near.unwrap_or((above.abs() / 1000.0).max(0.1));
-        if !is_length(near) {
-            bail!("--near {near:?}: expected {LENGTHS}");
-        }
+        let near = match self.near {
+            Some(near) if !is_length(near) => bail!("--near {near:?}: expected {LENGTHS}"),
+            Some(near) => near,
+            None => (above.abs() / 1000.0).clamp(0.1, FARTHEST_M),
+        };
         let lens = match self.ortho {
             Some(width) if is_length(width) => {
                 Lens::Orthographic { width, far: near + 2.0 * (eye.distance(whole.centre) + whole.radius) }

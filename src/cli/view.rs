@@ -68,8 +68,9 @@ pub fn has_display() -> bool {
 /// What a frame is to cost.
 fn target(args: &ViewerArgs) -> Result<Option<Target>> {
     let target = args.triangles.map(Target::Triangles).or(args.frame_time.map(Target::FrameMs));
-    if target.is_some_and(|target| !(target.cost().is_finite() && target.cost() > 0.0)) {
-        bail!("--triangles, --frame-time: expected a positive number");
+    if let Some(cost) = target.map(|target| target.cost()).filter(|cost| !(cost.is_finite() && *cost > 0.0)) {
+        let flag = if args.triangles.is_some() { "--triangles" } else { "--frame-time" };
+        bail!("{flag} {cost}: expected a positive number");
     }
     Ok(target)
 }

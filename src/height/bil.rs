@@ -11,6 +11,7 @@ use super::{
     asc, envi,
     georef::Grid,
     load::{Options, Source},
+    nodata,
     raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
@@ -47,7 +48,8 @@ pub(super) struct Header {
     pub start: u64,
     /// Bytes from one row to the next, if not those of its samples.
     pub stride: Option<u64>,
-    pub nodata: Option<f64>,
+    /// The text that declares the value for "no data".
+    pub nodata: Option<String>,
     /// Position, system and scale.
     pub georeference: Georeference,
 }
@@ -69,7 +71,9 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     }
     let rows = Rows { sample: header.sample, order: header.order, start: header.start, stride };
     let mut raster = Raster::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
-    raster.nodata = header.nodata;
+    if let Some(text) = &header.nodata {
+        raster.declare_nodata("header NODATA", text, options);
+    }
     raster.georeference = header.georeference;
     Ok(raster)
 }
@@ -115,11 +119,8 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
             return Err(values.error("BYTEORDER", format!("expected I, M, LSBFIRST or MSBFIRST, found {other}")));
         }
     };
-    let nodata = match values.number("nodata_value")? {
-        None => values.number("nodata")?,
-        nodata => nodata,
-    };
-    let sample = sample(&values, nodata)?;
+    let nodata = values.text("nodata_value").or(values.text("nodata"));
+    let sample = sample(&values, nodata.and_then(nodata::number))?;
     let size: [u64; 2] = [values.required("ncols")?, values.required("nrows")?];
     Ok(Header {
         format: if sample == SampleType::F32 { "ESRI FLT" } else { "ESRI BIL" },
@@ -128,7 +129,7 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
         order,
         start: values.number("skipbytes")?.unwrap_or(0),
         stride: values.number("totalrowbytes")?,
-        nodata,
+        nodata: nodata.map(str::to_owned),
         georeference: Georeference { affine: grid(&values, size)?.map(Affine::north_up), ..Georeference::default() },
     })
 }

@@ -33,7 +33,9 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Header, Error> {
         5 => SampleType::F64,
         12 => SampleType::U16,
         13 => SampleType::U32,
-        other => return Err(values.error("data type", format!("expected 1, 2, 3, 4, 5, 12 or 13, found {other}"))),
+        14 => SampleType::I64,
+        15 => SampleType::U64,
+        other => return Err(values.error("data type", format!("expected 1 to 5 or 12 to 15, found {other}"))),
     };
     let order = match values.number("byte order")?.unwrap_or(0u32) {
         0 => Order::Little,
@@ -47,7 +49,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Header, Error> {
         order,
         start: values.number("header offset")?.unwrap_or(0),
         stride: None,
-        nodata: values.number("data ignore value")?,
+        nodata: values.text("data ignore value").map(str::to_owned),
         georeference: georeference(&values)?,
     })
 }

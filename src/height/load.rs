@@ -42,6 +42,8 @@ pub struct Options {
     pub hole_fill: HoleFill,
     /// How a colour picture encodes heights.
     pub encoding: Option<Encoding>,
+    /// The band of a file of several, from 1; by default the first, or the colours of a picture.
+    pub band: Option<u32>,
     /// Zoom level of a tile directory; by default the highest complete one.
     pub zoom: Option<u32>,
     /// Files that claim more samples are refused.
@@ -60,6 +62,7 @@ impl Default for Options {
             tiles: None,
             hole_fill: HoleFill::No,
             encoding: None,
+            band: None,
             zoom: None,
             max_samples: 1 << 30,
         }
@@ -216,6 +219,16 @@ pub(super) fn samples(name: &str, [w, h]: [u64; 2], options: &Options) -> Result
     }
 }
 
+/// Refuses another band than the first, for formats that have no other.
+pub(super) fn one_band(name: &str, options: &Options) -> Result<(), Error> {
+    match options.band {
+        None | Some(1) => Ok(()),
+        Some(band) => {
+            Err(Error::new(name, "--band", format!("expected 1, the only band of this format, found {band}")))
+        }
+    }
+}
+
 /// Bytes looked at to tell the format.
 pub(super) const HEAD_BYTES: u64 = 4096;
 
@@ -270,6 +283,9 @@ pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result
 }
 
 fn decode(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+    if !matches!(kind, Kind::Tiff | Kind::Zip | Kind::Gzip) {
+        one_band(source.name, options)?;
+    }
     match kind {
         Kind::Tiff => geotiff::read(source, options),
         Kind::Png => png::read(source, options),

@@ -20,6 +20,7 @@ pub mod level_errors;
 pub mod levels;
 mod load;
 mod metadata;
+mod nodata;
 mod png;
 pub mod progress;
 mod raster;
@@ -33,7 +34,12 @@ pub mod surface;
 pub mod synth;
 mod terrain_rgb;
 mod text;
+mod tiff_bands;
+mod tiff_codec;
 mod tiff_directory;
+mod tiff_layout;
+mod tiff_mask;
+mod tiff_sample;
 mod tiles;
 mod units;
 mod unplaced;
@@ -43,6 +49,7 @@ mod world_file;
 
 pub use georef::metres_per_degree;
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
+pub use nodata::number;
 pub use raster::MAX_SIDE;
 pub use sample::{Order, SampleType};
 
@@ -140,6 +147,11 @@ impl Samples {
     pub fn multiply(&mut self, factor: f32) {
         match self {
             Samples::F32(heights) => heights.iter_mut().for_each(|h| *h *= factor),
+            // Codes stay in the order of the heights.
+            Samples::Coded { codes, zero, scale } if factor < 0.0 => {
+                codes.iter_mut().for_each(|code| *code = u16::MAX - *code);
+                (*zero, *scale) = (f32::from(u16::MAX) - *zero, *scale * -factor);
+            }
             Samples::Coded { scale, .. } => *scale *= factor,
         }
     }

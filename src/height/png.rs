@@ -1,10 +1,13 @@
-//! PNG with 8 or 16 bits of grey: a sample is the grey value.
+//! PNG with 8 or 16 bits of grey: a sample is the grey value. All its checksums are compared.
 
-use png::{BitDepth, ColorType, Decoder, DecodingError, Limits};
+use std::io::{BufRead, Seek};
+
+use image::RgbaImage;
+use png::{BitDepth, ColorType, DecodeOptions, Decoder, DecodingError, Limits, Transformations};
 
 use super::{
     Error, Holes, Samples,
-    load::{Options, Source},
+    load::{self, Options, Source},
     raster::Raster,
     sample::{Order, SampleType},
     terrain_rgb,
@@ -14,7 +17,7 @@ use super::{
 pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
     let name = source.name;
     let error = |place: String, e: DecodingError| Error::new(name, place, e);
-    let mut decoder = Decoder::new(&mut source.reader);
+    let mut decoder = checked(&mut source.reader);
     let header = decoder.read_header_info().map_err(|e| error("header".to_owned(), e))?;
     let (size, color, depth) = ([header.width, header.height], header.color_type, header.bit_depth);
     let interlaced = header.interlaced;
@@ -31,7 +34,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
             return terrain_rgb::read(source, "PNG", options);
         }
     };
-    let count = super::load::samples(name, size.map(u64::from), options)?;
+    let count = load::samples(name, size.map(u64::from), options)?;
     let row_bytes = size[0] as usize * sample.bytes() * color.samples();
     // The decoder holds a few rows; the rest of its default limit is for other chunks.
     decoder.set_limits(Limits { bytes: Limits::default().bytes.saturating_add(row_bytes.saturating_mul(8)) });
@@ -50,12 +53,52 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
             target.store(row.data(), j as usize * size[0] as usize);
         }
     }
+    // The last data's checksums are compared where the file ends.
+    reader.finish().map_err(|e| error("end".to_owned(), e))?;
     let transparent = reader.info().trns.as_ref().filter(|_| target.channels == 1);
     let transparent = transparent.map(|bytes| bytes.iter().fold(0, |value, &b| value << 8 | u32::from(b)));
     let mut raster = Raster::new("PNG", sample.name(), size, target.samples);
     raster.holes = target.holes;
     raster.nodata = transparent.map(f64::from);
     Ok(raster)
+}
+
+/// A decoder that compares every checksum, of optional chunks too: one of them says which value is transparent.
+fn checked<R: BufRead + Seek>(reader: R) -> Decoder<R> {
+    let mut options = DecodeOptions::default();
+    options.set_ignore_adler32(false);
+    options.set_skip_ancillary_crc_failures(false);
+    Decoder::new_with_options(reader, options)
+}
+
+/// Reads a picture of 8 bits a channel as colours with opacity.
+pub(super) fn colours(name: &str, reader: impl load::Input, options: &Options) -> Result<RgbaImage, Error> {
+    let error = |e: DecodingError| Error::new(name, "picture", e);
+    let mut decoder = checked(reader);
+    let header = decoder.read_header_info().map_err(error)?;
+    let (w, h, depth) = (header.width, header.height, header.bit_depth);
+    let count = load::samples(name, [w, h].map(u64::from), options)?;
+    if depth == BitDepth::Sixteen {
+        return Err(Error::new(name, "picture", "expected 8 bits a channel, found 16"));
+    }
+    decoder.set_limits(Limits { bytes: Limits::default().bytes.saturating_add(count.saturating_mul(4)) });
+    // A palette becomes colours, and a transparent colour opacity.
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(error)?;
+    let channels = reader.output_color_type().0.samples();
+    let mut pixels = vec![0; count * channels];
+    reader.next_frame(&mut pixels).map_err(error)?;
+    reader.finish().map_err(error)?;
+    let mut picture = RgbaImage::new(w, h);
+    for (to, pixel) in picture.pixels_mut().zip(pixels.chunks_exact(channels)) {
+        to.0 = match *pixel {
+            [grey] => [grey, grey, grey, u8::MAX],
+            [grey, alpha] => [grey, grey, grey, alpha],
+            [r, g, b] => [r, g, b, u8::MAX],
+            _ => [pixel[0], pixel[1], pixel[2], pixel[3]],
+        };
+    }
+    Ok(picture)
 }
 
 /// Where pixels go.

@@ -9,6 +9,9 @@ use super::{
     unplaced,
 };
 
+/// The farthest from 0 that a height may be, metres: f64 holds a tenth of a millimetre there.
+const FARTHEST_M: f64 = 1e12;
+
 /// Samples as a file stores them, before crop, holes and metres.
 pub(super) struct Raster {
     /// Name of the file format.
@@ -120,31 +123,6 @@ impl Raster {
         Ok(())
     }
 
-    /// Makes holes of the nodata value, NaN and infinities.
-    fn make_holes(&mut self, options: &Options) {
-        // The nodata value is often rounded on its way through text: two units in the last place of an f32.
-        let nodata = options.nodata.or(self.nodata).map(|value| value / self.step);
-        let slack = nodata.map_or(0.0, |value| 2.0 * f64::from(f32::EPSILON) * value.abs());
-        let is_nodata =
-            |value: f32| nodata.is_some_and(|none| value == none as f32 || (f64::from(value) - none).abs() <= slack);
-        if nodata.is_none() && matches!(self.samples, Samples::Coded { .. }) {
-            return;
-        }
-        let mut bad = 0u64;
-        for k in 0..self.samples.len() {
-            let value = self.samples.height(k);
-            if is_nodata(value) {
-                self.holes.insert(k);
-            } else if !value.is_finite() {
-                bad += u64::from(!self.holes.contains(k));
-                self.holes.insert(k);
-            }
-        }
-        if bad > 0 && nodata.is_none_or(f64::is_finite) {
-            self.warnings.push(format!("{bad} samples are NaN or infinite and become holes"));
-        }
-    }
-
     /// The lowest and highest value, with a warning about what looks like nodata.
     fn check_range(&mut self) -> [f32; 2] {
         let (mut low, mut high) = (Edge::default(), Edge::default());
@@ -202,13 +180,26 @@ impl Raster {
 
     /// Turns values into metres: (value · scale + offset) · unit · `--height-scale` + `--height-offset`.
     fn to_metres(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
-        let unit = self.unit * options.height_scale.unwrap_or(1.0);
-        let (factor, offset) = (self.step * self.scale * unit, self.offset * unit + options.height_offset);
-        let is_finite = |value: f64| (value as f32).is_finite();
-        let stays = |value: f32| is_finite(f64::from(value) * factor + offset);
-        if !is_finite(factor) || factor as f32 == 0.0 || !is_finite(offset) || !range.into_iter().all(stays) {
-            let what = format!("expected heights that stay finite, found {range:?} times {factor} plus {offset}");
-            return Err(Error::new(name, "--height-scale", what));
+        let metres = |unit: f64, shift: f64| (self.step * self.scale * unit, self.offset * unit + shift);
+        let is_far = |value: f32, (factor, offset): (f64, f64)| {
+            !(0.0..=FARTHEST_M).contains(&(f64::from(value) * factor + offset).abs())
+        };
+        let own = metres(self.unit, 0.0);
+        if let Some(far) = range.into_iter().find(|&value| is_far(value, own)) {
+            let far = f64::from(far) * self.step;
+            let what = format!("expected at most 1e12 m, found {far:e}; --nodata {far:e} makes it a hole");
+            return Err(Error::new(name, "heights", what));
+        }
+        let (factor, offset) = metres(self.unit * options.height_scale.unwrap_or(1.0), options.height_offset);
+        let is_usable = |factor: f64| factor.is_finite() && factor as f32 != 0.0;
+        if !is_usable(factor) || range.iter().any(|&value| is_far(value, (factor, offset))) {
+            let what = format!("expected heights of at most 1e12 m, found {range:?} times {factor} plus {offset}");
+            let place = match options.height_scale {
+                _ if !is_usable(own.0) => "scale of the band",
+                Some(_) => "--height-scale",
+                None => "--height-offset",
+            };
+            return Err(Error::new(name, place, what));
         }
         if offset != 0.0 {
             self.samples.scale_and_shift(factor, offset);
@@ -286,7 +277,7 @@ fn distance(a: f32, b: f32) -> f64 {
 fn is_usual(value: f64) -> bool {
     // −10000 m is black in Mapbox Terrain-RGB.
     const USUAL: [f64; 9] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -10000.0, -99999.0, -999.0, 9999.0];
-    USUAL.iter().any(|usual| (value - usual).abs() < 1e-3) || value.abs() > 1e30
+    USUAL.iter().any(|usual| (value - usual).abs() < 1e-3)
 }
 
 impl Samples {

@@ -1,5 +1,7 @@
 //! The number types files store samples as.
 
+use half::f16;
+
 use super::Samples;
 
 /// Order of the bytes of a number.
@@ -38,9 +40,15 @@ pub enum SampleType {
     U32,
     /// Signed, 32 bits.
     I32,
+    /// Unsigned, 64 bits; heights are the nearest f32.
+    U64,
+    /// Signed, 64 bits; heights are the nearest f32.
+    I64,
+    /// Floating point, 16 bits.
+    F16,
     /// Floating point, 32 bits.
     F32,
-    /// Floating point, 64 bits.
+    /// Floating point, 64 bits; heights are the nearest f32.
     F64,
 }
 
@@ -49,9 +57,9 @@ impl SampleType {
     pub fn bytes(self) -> usize {
         match self {
             SampleType::U8 | SampleType::I8 => 1,
-            SampleType::U16 | SampleType::I16 => 2,
+            SampleType::U16 | SampleType::I16 | SampleType::F16 => 2,
             SampleType::U32 | SampleType::I32 | SampleType::F32 => 4,
-            SampleType::F64 => 8,
+            SampleType::U64 | SampleType::I64 | SampleType::F64 => 8,
         }
     }
 
@@ -64,6 +72,9 @@ impl SampleType {
             SampleType::I16 => "i16",
             SampleType::U32 => "u32",
             SampleType::I32 => "i32",
+            SampleType::U64 => "u64",
+            SampleType::I64 => "i64",
+            SampleType::F16 => "f16",
             SampleType::F32 => "f32",
             SampleType::F64 => "f64",
         }
@@ -109,6 +120,9 @@ impl SampleType {
         match self {
             SampleType::U32 => each(bytes, heights, |b| u32::from_ne_bytes(order.native(b)) as f32),
             SampleType::I32 => each(bytes, heights, |b| i32::from_ne_bytes(order.native(b)) as f32),
+            SampleType::U64 => each(bytes, heights, |b| u64::from_ne_bytes(order.native(b)) as f32),
+            SampleType::I64 => each(bytes, heights, |b| i64::from_ne_bytes(order.native(b)) as f32),
+            SampleType::F16 => each(bytes, heights, |b| f16::from_ne_bytes(order.native(b)).to_f32()),
             SampleType::F64 => each(bytes, heights, |b| f64::from_ne_bytes(order.native(b)) as f32),
             _ => each(bytes, heights, |b| f32::from_ne_bytes(order.native(b))),
         }

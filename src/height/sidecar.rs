@@ -26,7 +26,10 @@ pub(super) struct Georeference {
 /// Settles the place, the turn, the scale and the unit of a raster.
 pub(super) fn settle(source: &Source, options: &Options, raster: &mut Raster) {
     let stated = std::mem::take(&mut raster.georeference);
-    let beside = source.sibling_text("aux.xml").map(|text| metadata::from_aux_xml(&text, 1)).unwrap_or_default();
+    let beside = source
+        .sibling_text("aux.xml")
+        .map(|text| metadata::from_aux_xml(&text, options.band.unwrap_or(1)))
+        .unwrap_or_default();
     let band = beside.or(stated.band);
     raster.warnings.extend(band.warnings);
     raster.nodata = band.nodata.map(|value| value * raster.step).or(raster.nodata);

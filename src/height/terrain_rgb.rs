@@ -2,11 +2,12 @@
 
 use std::{io::Cursor, str::FromStr};
 
-use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbaImage};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbaImage};
 
 use super::{
     Error, Holes, Samples,
     load::{self, Options, Source},
+    png,
     raster::Raster,
 };
 
@@ -48,9 +49,8 @@ impl Encoding {
         }
     }
 
-    /// The value of a colour in steps of [`Self::step`]; exact, for it has 24 bits.
-    fn value(self, [r, g, b]: [u8; 3]) -> f32 {
-        let number = i32::from(r) << 16 | i32::from(g) << 8 | i32::from(b);
+    /// The value of a colour, as a number of 24 bits, in steps of [`Self::step`]; exact.
+    pub(super) fn value(self, number: i32) -> f32 {
         match self {
             Encoding::Terrarium => (number - (32768 << 8)) as f32 / 256.0,
             Encoding::Mapbox => (number - 100_000) as f32,
@@ -60,7 +60,7 @@ impl Encoding {
     /// Stores pixels of 3 or 4 bytes as samples `at..`; where alpha is 0 there is no data.
     pub(super) fn store(self, pixels: &[u8], channels: usize, heights: &mut [f32], holes: &mut Holes, at: usize) {
         for (k, pixel) in (at..heights.len()).zip(pixels.chunks_exact(channels)) {
-            heights[k] = self.value([pixel[0], pixel[1], pixel[2]]);
+            heights[k] = self.value(pixel[..3].iter().fold(0, |number, &byte| number << 8 | i32::from(byte)));
             if pixel.get(3) == Some(&0) {
                 holes.insert(k);
             }
@@ -95,9 +95,13 @@ pub(super) fn decode_bytes(name: &str, bytes: &[u8], options: &Options) -> Resul
 
 fn decode(name: &str, reader: impl load::Input, options: &Options) -> Result<RgbaImage, Error> {
     let error = |e: &dyn std::fmt::Display| Error::new(name, "picture", e);
+    let reader = ImageReader::new(reader).with_guessed_format().map_err(|e| error(&e))?;
+    if reader.format() == Some(ImageFormat::Png) {
+        return png::colours(name, reader.into_inner(), options);
+    }
     let mut limits = Limits::default();
     limits.max_alloc = Some(options.max_samples.saturating_mul(8).max(1 << 20));
-    let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|e| error(&e))?;
+    let mut reader = reader;
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|e| error(&e))?;
     let (w, h) = decoder.dimensions();

@@ -30,8 +30,8 @@ pub(super) fn check(source: &mut Source, options: &Options) -> Result<(), Error>
     let (w, h) = (number(WIDTH, 0), number(LENGTH, 0));
     source.samples([w, h], options)?;
     let bands = number(SAMPLES_PER_PIXEL, 1);
-    if !(1..=4).contains(&bands) || h.saturating_mul(bands) > u64::from(u32::MAX) {
-        return Err(source.error("SamplesPerPixel", format!("expected 1 band, or 3 or 4 of colour, found {bands}")));
+    if !(1..=u64::from(u16::MAX)).contains(&bands) || h.saturating_mul(bands) > u64::from(u32::MAX) {
+        return Err(source.error("SamplesPerPixel", format!("expected 1 to 65535 bands, found {bands}")));
     }
     let tile = number(TILE_WIDTH, 1).saturating_mul(number(TILE_LENGTH, 1));
     if !(1..=TILE_SAMPLES).contains(&tile) || number(ROWS_PER_STRIP, 1) == 0 {

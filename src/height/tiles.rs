@@ -26,6 +26,7 @@ const TILE_BYTES: u64 = 1 << 26;
 /// Reads the bounding rectangle of the tiles at one zoom level; absent tiles are holes.
 pub(super) fn read(path: &Path, options: &Options) -> Result<Raster, Error> {
     let name = path.display().to_string();
+    load::one_band(&name, options)?;
     let (zoom, level) = choose(scan(path)?, &name, options)?;
     let encoding = encoding(path, &name, options)?;
     let [west, north, east, south] = bounds(&level);

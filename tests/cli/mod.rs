@@ -1,6 +1,7 @@
 //! The program, run as a person runs it.
 
 mod endless;
+mod numbers;
 mod robust;
 mod watchdog;
 #[cfg(feature = "vulkan")]

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use clap::{Arg, Parser};
+use clap::Arg;
 use cuesta::cli::bench::{BenchArgs, MeasureArgs};
 use cuesta::cli::cases::Planned;
 use cuesta::cli::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
@@ -142,7 +142,7 @@ fn measured(args: &MeasureArgs) {
 }
 
 fn check(words: &[String]) {
-    let cli = match Cli::try_parse_from(std::iter::once("cuesta").chain(words.iter().map(String::as_str))) {
+    let cli = match Cli::parse_words(std::iter::once("cuesta").chain(words.iter().map(String::as_str))) {
         Ok(cli) => cli,
         Err(error) => {
             let line = one_line(&error);

@@ -53,7 +53,7 @@ fn nan_and_infinity_become_holes() {
 #[test]
 fn undeclared_nodata_is_named() {
     for (bits, format, value) in
-        [(16, 2, -32768.0), (16, 2, -32767.0), (16, 2, -9999.0), (16, 1, 65535.0), (32, 3, -9999.0), (32, 3, 1e38)]
+        [(16, 2, -32768.0), (16, 2, -32767.0), (16, 2, -9999.0), (16, 1, 65535.0), (32, 3, -9999.0)]
     {
         let options = Options { spacing: Some([1.0; 2]), ..Options::default() };
         let loaded = load(&TiffFile::new(SIZE, bits, format), with(value), &options);

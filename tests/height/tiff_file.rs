@@ -15,6 +15,14 @@ pub struct TiffFile {
     pub bits: u16,
     pub format: u16,
     pub bands: usize,
+    /// True if each band has chunks of its own.
+    pub planar: bool,
+    /// Bytes before the file's first: where it is appended to another.
+    pub base: usize,
+    /// Bytes after the data of each chunk.
+    pub padding: Vec<u8>,
+    /// True if ZSTD data are compressed, with a checksum.
+    pub checksum: bool,
     /// Further tags: doubles, shorts or text.
     pub tags: Vec<(u16, Tag)>,
 }
@@ -45,6 +53,10 @@ impl TiffFile {
             bits,
             format,
             bands: 1,
+            planar: false,
+            base: 0,
+            padding: Vec::new(),
+            checksum: false,
             tags: Vec::new(),
         }
     }
@@ -71,18 +83,23 @@ impl TiffFile {
     pub fn bytes(&self, value: impl Fn(usize, usize) -> f64) -> Vec<u8> {
         let [w, h] = self.size;
         let [cw, ch] = self.tile.unwrap_or([w, 2]);
+        let planes = if self.planar { self.bands } else { 1 };
+        let stride = self.bands / planes;
         let mut chunks = Vec::new();
-        for z in (0..h).step_by(ch) {
-            for x in (0..w).step_by(cw) {
-                // A strip ends with the picture, a tile is padded.
-                let rows = if self.tile.is_some() { ch } else { ch.min(h - z) };
-                let mut chunk = Vec::new();
-                for j in z..z + rows {
-                    let inside = |i: usize| if i < w * self.bands && j < h { value(i, j) } else { 0.0 };
-                    let row: Vec<f64> = (x * self.bands..(x + cw) * self.bands).map(inside).collect();
-                    chunk.extend(self.predicted(&row));
+        for plane in 0..planes {
+            for z in (0..h).step_by(ch) {
+                for x in (0..w).step_by(cw) {
+                    // A strip ends with the picture, a tile is padded.
+                    let rows = if self.tile.is_some() { ch } else { ch.min(h - z) };
+                    let mut chunk = Vec::new();
+                    for j in z..z + rows {
+                        let inside =
+                            |i: usize| if i / stride < w && j < h { value(i * planes + plane, j) } else { 0.0 };
+                        let row: Vec<f64> = (x * stride..(x + cw) * stride).map(inside).collect();
+                        chunk.extend(self.predicted(&row, stride));
+                    }
+                    chunks.push([self.compressed(&chunk), self.padding.clone()].concat());
                 }
-                chunks.push(self.compressed(&chunk));
             }
         }
         self.assemble(&chunks)
@@ -101,15 +118,17 @@ impl TiffFile {
         match (self.format, self.bits) {
             (1, _) => value as u64,
             (2, bits) => value as i64 as u64 & (u64::MAX >> (64 - bits)),
+            (_, 16) => u64::from(half::f16::from_f64(value).to_bits()),
             (_, 32) => u64::from((value as f32).to_bits()),
             _ => value.to_bits(),
         }
     }
 
-    fn predicted(&self, row: &[f64]) -> Vec<u8> {
-        let (len, bands) = (usize::from(self.bits) / 8, self.bands);
+    fn predicted(&self, row: &[f64], bands: usize) -> Vec<u8> {
+        let len = usize::from(self.bits) / 8;
         let patterns: Vec<u64> = row.iter().map(|&value| self.pattern(value)).collect();
         match self.predictor {
+            1 if !matches!(self.bits, 8 | 16 | 32 | 64) => packed(&patterns, self.bits),
             1 => patterns.iter().flat_map(|&p| self.number(p, len)).collect(),
             2 => (0..patterns.len())
                 .map(|i| patterns[i].wrapping_sub(if i < bands { 0 } else { patterns[i - bands] }))
@@ -138,6 +157,11 @@ impl TiffFile {
                 .chunks(128)
                 .flat_map(|run| std::iter::once(run.len() as u8 - 1).chain(run.iter().copied()))
                 .collect(),
+            ZSTD if self.checksum => {
+                let mut compressor = zstd::bulk::Compressor::new(3).unwrap();
+                compressor.include_checksum(true).unwrap();
+                compressor.compress(bytes).unwrap()
+            }
             ZSTD => {
                 // One frame of known size, one raw block.
                 let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
@@ -161,13 +185,14 @@ impl TiffFile {
             (262, Tag::Short(vec![photometric])),
             (277, Tag::Short(vec![self.bands as u16])),
             (317, Tag::Short(vec![self.predictor])),
+            (284, Tag::Short(vec![if self.planar { 2 } else { 1 }])),
             (339, Tag::Short(vec![self.format; self.bands])),
         ];
         let header = if self.big_tiff { 16 } else { 8 };
         let mut offsets = Vec::new();
         let mut data = Vec::new();
         for chunk in chunks {
-            offsets.push((header + data.len()) as u64);
+            offsets.push((self.base + header + data.len()) as u64);
             data.extend(chunk);
         }
         let counts = chunks.iter().map(|chunk| chunk.len() as u64).collect();
@@ -193,7 +218,7 @@ impl TiffFile {
         } else {
             bytes.extend(self.number(42, 2));
         }
-        let directory = header + data.len();
+        let directory = self.base + header + data.len();
         bytes.extend(self.number(directory as u64, word));
         bytes.extend(data);
         let count_len = if self.big_tiff { 8 } else { 2 };
@@ -225,6 +250,31 @@ impl TiffFile {
             Tag::Text(v) => (2, v.len() as u64 + 1, [v.as_bytes(), &[0]].concat()),
         }
     }
+}
+
+/// The same file with a further image: `first` and then this one, whose `base` is the first one's length. Both little-endian.
+pub fn chained(first: &[u8], next: &[u8]) -> Vec<u8> {
+    let mut bytes = [first, next].concat();
+    let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let (mut end, pointer) = (number(4) as usize, number(first.len() + 4));
+    // The last directory of the first file ends with the position of the next one.
+    loop {
+        let entries = usize::from(u16::from_le_bytes(bytes[end..end + 2].try_into().unwrap()));
+        let at = end + 2 + 12 * entries;
+        match number(at) {
+            0 => {
+                bytes[at..at + 4].copy_from_slice(&pointer.to_le_bytes());
+                return bytes;
+            }
+            further => end = further as usize,
+        }
+    }
+}
+
+/// Numbers of some bits, the highest first, and the rest of the last byte.
+fn packed(patterns: &[u64], bits: u16) -> Vec<u8> {
+    let all: Vec<u8> = patterns.iter().flat_map(|p| (0..bits).rev().map(move |bit| (p >> bit & 1) as u8)).collect();
+    all.chunks(8).map(|eight| (0..8).fold(0, |byte, k| byte << 1 | eight.get(k).copied().unwrap_or(0))).collect()
 }
 
 /// LZW that never grows its codes: a clear code before each 100 literals.
