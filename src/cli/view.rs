@@ -84,15 +84,15 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     }
     let target = target(args)?;
     let field = Arc::new(args.terrain.load(common)?.field);
-    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let (look, overlay) = args.look.build(&args.terrain.name())?;
     let summary = viewer::run(&Setup {
-        name: args.terrain.terrain.clone(),
+        name: args.terrain.name(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
         field,
         near: args.view.near,
         technique: args.technique.settings()?,
         choices: args.technique.settings.clone(),
-        overlay: overlay.or(args.look.picture(&args.terrain.terrain)?),
+        overlay: overlay.or(args.look.picture(&args.terrain.name())?),
         look,
         choice: render::choice(common),
         validate: common.validate,

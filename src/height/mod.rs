@@ -9,14 +9,17 @@ pub mod cave;
 mod cuts;
 pub mod demo;
 mod envi;
+mod folder;
 mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
 pub(crate) mod kept;
+mod known_formats;
 pub mod level_errors;
 pub mod levels;
 mod load;
+mod mosaic;
 mod png;
 pub mod progress;
 mod raster;
@@ -30,11 +33,14 @@ pub mod synth;
 mod terrain_rgb;
 mod text;
 mod tiff_directory;
+mod tile_grid;
 mod tiles;
 mod usgs_dem;
 
 pub use georef::metres_per_degree;
-pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
+pub use load::{
+    Encoding, HoleFill, Loaded, Options, RawLayout, SourceFile, load, load_all, load_bytes, load_bytes_with,
+};
 pub use sample::{Order, SampleType};
 
 use std::ops::Range;
