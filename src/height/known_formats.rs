@@ -35,7 +35,7 @@ const fn known(at: usize, magic: &'static [u8], name: &'static str, advice: &'st
 }
 
 /// An empty file.
-static EMPTY: Known = known(0, b"", "an empty file of 0 bytes", "download or export it again");
+static EMPTY: Known = known(0, b"", "0 bytes (an empty file)", "download or export it again");
 static XYZ: Known = known(0, b"", "XYZ text", TABLE);
 static HTML: Known = known(0, b"", "an HTML page", DOWNLOAD);
 static GEOJSON: Known = known(0, b"", "GeoJSON", VECTOR);

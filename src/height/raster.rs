@@ -116,7 +116,8 @@ impl Raster {
     fn make_holes(&mut self, options: &Options) {
         // The nodata value is often rounded on its way through text: two units in the last place of an f32.
         let nodata = options.nodata.or(self.nodata).map(|value| value / self.step);
-        let slack = nodata.map_or(0.0, |value| 2.0 * f64::from(f32::EPSILON) * value.abs());
+        let slack =
+            nodata.filter(|value| value.is_finite()).map_or(0.0, |value| 2.0 * f64::from(f32::EPSILON) * value.abs());
         let is_nodata =
             |value: f32| nodata.is_some_and(|none| value == none as f32 || (f64::from(value) - none).abs() <= slack);
         if nodata.is_none() && matches!(self.samples, Samples::Coded { .. }) {

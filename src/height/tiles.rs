@@ -49,13 +49,12 @@ pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Raste
             continue;
         }
         let picture = terrain_rgb::decode_bytes(&tile_name, &content, options)?;
+        // Servers answer with a transparent picture of any size where there is nothing.
+        if picture.pixels().all(|pixel| pixel.0[3] == 0) {
+            continue;
+        }
         let side = target.as_ref().map_or(picture.width(), |mosaic| mosaic.side);
         if picture.dimensions() != (side, side) {
-            // Servers answer with a transparent picture of any size where there is nothing.
-            if picture.pixels().all(|pixel| pixel.0[3] == 0) {
-                empty += 1;
-                continue;
-            }
             let what = format!("expected {side}x{side} pixels, found {}x{}", picture.width(), picture.height());
             return Err(Error::new(tile_name, "size", what));
         }
@@ -65,7 +64,9 @@ pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Raste
         };
         mosaic.store(encoding, picture.as_raw(), [x - west, y - north]);
     }
-    let Some(mosaic) = target else { return Err(no_tiles(&name)) };
+    let Some(mosaic) = target else {
+        return Err(Error::new(name, "directory", format!("expected tiles with data at zoom {zoom}, found none")));
+    };
 
     let place = grid.place(&name, zoom, mosaic.side, [west, north])?;
     let format = match encoding {

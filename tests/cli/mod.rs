@@ -2,6 +2,7 @@
 
 mod endless;
 mod robust;
+mod several;
 #[cfg(feature = "vulkan")]
 mod with_a_device;
 

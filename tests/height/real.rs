@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use cuesta::height::{self, Encoding, Loaded, Options};
 
 /// The path of a shared data file; `None`, said aloud, where they are not.
-fn shared(file: &str) -> Option<PathBuf> {
+pub fn shared(file: &str) -> Option<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     if !folder.is_dir() {
         eprintln!("skipped: {} is absent", folder.display());
