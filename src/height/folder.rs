@@ -11,9 +11,9 @@ use super::{
     mosaic::Parts,
 };
 
-/// Extensions of what belongs to a raster beside it, lower case: some have a raster's content.
+/// Extensions of files that belong to a raster, lower case. Some, as overviews, are rasters themselves.
 const COMPANIONS: [&str; 10] = ["hdr", "prj", "xml", "aux", "ovr", "msk", "rrd", "stx", "clr", "wld"];
-/// Extensions of what is expected beside height files, lower case, and no matter for a warning.
+/// Extensions of texts that commonly lie beside height files, lower case.
 const TEXTS: [&str; 14] =
     ["txt", "md", "json", "csv", "html", "htm", "pdf", "log", "sha256", "md5", "qml", "lyr", "ini", "db"];
 
@@ -24,14 +24,14 @@ fn name_and_extension(path: &str) -> (String, String) {
     (name, extension)
 }
 
-/// Whether a file belongs to a raster beside it, by its name: a header, world file, overview, or hidden file.
+/// Returns true if a name is that of a raster's companion: a header, world file, overview, or hidden file.
 pub(super) fn is_companion(path: &str) -> bool {
     let (name, extension) = name_and_extension(path);
     let is_world_file = (3..=4).contains(&extension.len()) && extension.ends_with('w') && extension != "raw";
     name.starts_with('.') || name.contains(".cuesta-") || is_world_file || COMPANIONS.contains(&extension.as_str())
 }
 
-/// Whether a file without heights is no surprise among height files.
+/// Returns true if a name is that of a text or companion that commonly lies beside height files.
 fn is_expected(path: &str) -> bool {
     let (name, extension) = name_and_extension(path);
     is_companion(path) || name.starts_with("readme") || TEXTS.contains(&extension.as_str())
@@ -74,7 +74,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 pub(super) struct LeftOut(Vec<String>);
 
 impl LeftOut {
-    /// Notes a file, unless it is expected beside height files.
+    /// Notes a file, unless it commonly lies beside height files.
     pub fn add(&mut self, name: &str, kind: Kind) {
         match kind {
             _ if is_expected(name) => (),

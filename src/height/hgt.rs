@@ -47,8 +47,8 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     Ok(raster)
 }
 
-/// The error of a tile such as `N45W074T86`: 1 of 9 x 9 parts of a degree, at 1/3 arc-second. In which order they are
-/// counted is nowhere published.
+/// The error of a tile such as `N45W074T86`: 1 of 9 x 9 parts of a degree, at 1/3 arc-second. The order of their
+/// numbers is not published.
 fn part_of_a_degree(part: &str, [_, lat]: [f64; 2], [w, h]: [u32; 2]) -> String {
     let [dx, dz] = metres_per_degree(lat + 0.5).map(|metres| metres / 9.0);
     let (dx, dz) = (dx / f64::from(w - 1), dz / f64::from(h - 1));
@@ -58,7 +58,7 @@ fn part_of_a_degree(part: &str, [_, lat]: [f64; 2], [w, h]: [u32; 2]) -> String 
     )
 }
 
-/// What a tile's name says.
+/// The position in a tile's name.
 #[derive(Debug, PartialEq)]
 struct Corner {
     /// Longitude and latitude of the south-west corner, degrees.

@@ -183,7 +183,7 @@ fn text(head: &[u8]) -> Option<&'static Known> {
     })
 }
 
-/// Whether the lines after a title and comments have three numbers each.
+/// Returns true if every line after a title and comments has three numbers.
 fn is_xyz(head: &str) -> bool {
     let whole = head.rsplit_once('\n').map_or(head, |(whole, _)| whole);
     let lines = whole.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with(['#', '/']));

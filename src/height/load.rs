@@ -326,7 +326,7 @@ impl Kind {
         }
     }
 
-    /// Whether a file of this format among others is read for its heights.
+    /// Returns true if a file of this format in a folder is read for its heights.
     pub fn holds_heights(self) -> bool {
         !matches!(self, Kind::Header | Kind::Known(_) | Kind::Unknown)
     }

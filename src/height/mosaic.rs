@@ -24,12 +24,12 @@ pub(super) struct Part {
 pub(super) struct Parts {
     list: Vec<Part>,
     samples: u64,
-    /// What the user should know beside the warnings of each raster.
+    /// Warnings about the whole, beside those of each raster.
     pub warnings: Vec<String>,
 }
 
 impl Parts {
-    /// How many rasters there are.
+    /// Number of rasters.
     pub fn len(&self) -> usize {
         self.list.len()
     }
@@ -53,8 +53,10 @@ impl Parts {
         Ok(())
     }
 
-    /// Leaves out, of the rasters from `begin` on that one folder or archive holds, those without a position beside
-    /// others that have one, and those that cover the ground of another: a count or a mask beside the heights.
+    /// Removes companions from the rasters of one folder or archive, which begin at `begin`.
+    ///
+    /// A companion has no position beside rasters that have one, as a preview. Or it covers the samples of an earlier
+    /// raster, as a mask or a count.
     pub fn leave_out_companions(&mut self, begin: usize) {
         let group = self.list.split_off(begin);
         let any_placed = group.iter().any(|part| part.raster.place.is_some());
@@ -74,7 +76,7 @@ impl Parts {
         self.samples = self.list.iter().map(|part| part.raster.samples.len() as u64).sum();
     }
 
-    /// Puts the rasters together: where several have data the last one counts, where none has it there is a hole.
+    /// Combines the rasters. Where several have data the last one counts; where none has data there is a hole.
     pub fn join(self, name: &str, options: &Options) -> Result<(Raster, Vec<SourceFile>), Error> {
         let Self { mut list, warnings, .. } = self;
         if let [part] = &mut list[..] {
@@ -99,7 +101,7 @@ impl Parts {
     }
 }
 
-/// Whether two rasters have the same size at the same place.
+/// Returns true if two rasters have the same size at the same place.
 fn covers_same(a: &Raster, b: &Raster) -> bool {
     let same = |(a, b): (&Place, &Place)| a.unit == b.unit && offset(a, b).iter().all(|steps| steps.abs() < ON_GRID);
     a.size == b.size && a.place.as_ref().zip(b.place.as_ref()).is_some_and(same)
@@ -111,7 +113,7 @@ fn offset(first: &Place, other: &Place) -> [f64; 2] {
     [east / first.step[0], -north / first.step[1]]
 }
 
-/// Where each raster lies in the rectangle around all.
+/// Position of each raster in the rectangle around all.
 struct Layout {
     size: [u64; 2],
     /// Column and row of each raster's north-west sample.
@@ -232,13 +234,13 @@ struct Canvas {
     known: Holes,
     /// Samples within some raster.
     covered: Holes,
-    /// How many samples rasters disagree about, and by how much at most.
+    /// Number of samples with other heights in an earlier raster, and the largest difference.
     apart: (u64, f32),
 }
 
 impl Canvas {
-    /// Copies rasters to their corners and says what became of overlaps and gaps. Values stay those of the files
-    /// where all count alike; else they are metres.
+    /// Copies rasters to their corners, with warnings about overlaps and gaps. Values are copied unchanged if all
+    /// files have one unit; otherwise they become metres.
     fn paint(parts: Vec<Part>, size: [u32; 2], count: usize, corners: &[[u32; 2]]) -> Raster {
         let first = &parts[0].raster;
         let (step, unit, format, sample_type) = (first.step, first.unit, first.format, first.sample_type.clone());

@@ -35,7 +35,7 @@ pub(super) struct Words {
     /// Line of the last word, from 1.
     pub line: u64,
     word: String,
-    /// Whether the first bytes have been read.
+    /// True once the first bytes have been read.
     begun: bool,
 }
 

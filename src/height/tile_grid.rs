@@ -20,7 +20,7 @@ const TMS: &str = "tilemapresource.xml";
 /// The grid of a tile directory; by default web Mercator with rows from the north.
 #[derive(Debug, Default)]
 pub(super) struct TileGrid {
-    /// Whether row 0 is the southernmost one, as in a Tile Map Service.
+    /// True if row 0 is the southernmost one, as in a Tile Map Service.
     from_south: bool,
     /// The encoding that a description names.
     pub encoding: Option<Encoding>,
@@ -86,7 +86,7 @@ impl TileGrid {
         Ok(Self { from_south: true, encoding: None, other })
     }
 
-    /// The tile number from the west and the north, if there is such a tile at a zoom level.
+    /// The tile's column from the west and row from the north, if it lies within a zoom level.
     pub fn from_north_west(&self, zoom: u32, [x, y]: [u32; 2]) -> Option<[u32; 2]> {
         // A geodetic grid has two tiles side by side at level 0.
         let columns = (1u64 << zoom) * if self.other.is_some() { 2 } else { 1 };
@@ -94,7 +94,7 @@ impl TileGrid {
         is_tile.then(|| [x, if self.from_south { (1 << zoom) - 1 - y } else { y }])
     }
 
-    /// Where the samples lie of tiles of `side` pixels, of which `corner` is the north-west one.
+    /// Place of the samples of tiles with `side` pixels a side; `corner` is the north-west tile.
     pub fn place(&self, name: &str, zoom: u32, side: u32, corner: [u32; 2]) -> Result<Place, Error> {
         let (side, tiles) = (f64::from(side), f64::from(1u32 << zoom));
         let centre = |tile: u32| f64::from(tile) * side + 0.5;

@@ -107,7 +107,7 @@ pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
     Ok((!levels.is_empty()).then_some(Tiles { grid, levels }))
 }
 
-/// What lies in a directory under names that are numbers, and whether `@2x` follows.
+/// Entries of a directory with numbers as names; the flag is true if `@2x` follows the number.
 fn numbered(path: &Path) -> Result<Vec<(u32, bool, PathBuf)>, Error> {
     let entries = fs::read_dir(path).map_err(|e| Error::new(path.display().to_string(), "directory", e))?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));

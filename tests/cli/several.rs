@@ -66,7 +66,7 @@ fn formats_that_are_not_read_are_named_in_one_line() {
     }
 }
 
-/// A pipe that nobody writes to would be waited for.
+/// Opening a pipe waits for its writer.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_refused_at_once() {
