@@ -42,6 +42,8 @@ static GEOJSON: Known = known(0, b"", "GeoJSON", VECTOR);
 static JSON: Known = known(0, b"", "JSON text", DOWNLOAD);
 static XML: Known = known(0, b"", "XML text", DOWNLOAD);
 static TILEJSON: Known = known(0, b"", "the description of a tile directory", "give the directory instead");
+static ZARR: Known = known(0, b"", "a Zarr array", RASTER);
+static COVERAGE: Known = known(0, b"", "an Arc/Info binary grid", RASTER);
 static GEODATABASE: Known = known(0, b"", "an Esri file geodatabase", PACKAGE);
 
 /// Formats by magic bytes; the first match counts.
@@ -64,6 +66,8 @@ static BINARY: &[Known] = &[
     known(0, b"DSRB", "a Surfer grid", RASTER),
     known(0, b"RUU CROSS SYSTEM MAP FORMAT", "a PCRaster map", RASTER),
     known(0, b"HGPC", "a Vertical Mapper grid", RASTER),
+    known(0, b"PCIDSK", "PCIDSK", RASTER),
+    known(0, b"binterr1.", "a VTP binary terrain (.bt)", RASTER),
     known(0, b"SIMPLE  =", "FITS", RASTER),
     known(0, b"TERRAGENTERRAIN ", "a Terragen terrain", RASTER),
     known(0, b"CntZImage ", "LERC", RASTER),
@@ -133,6 +137,11 @@ static TEXT: &[Known] = &[
     known(0, b"<tilemap", "the description of a tile directory", "give the directory instead"),
     known(0, b"north:", "a GRASS ASCII grid", RASTER),
     known(0, b"datasetheader begin", "an ER Mapper header (.ers)", RASTER),
+    known(0, b"name\t=", "a SAGA header (.sgrd)", RASTER),
+    known(0, b"file format :", "an Idrisi header (.rdc)", RASTER),
+    known(0, b"[basemap]", "an ILWIS map", RASTER),
+    known(0, b"<mrf_meta>", "a Meta Raster Format description (.mrf)", RASTER),
+    known(0, b"<pamdataset", "the metadata of a raster (.aux.xml)", "give the raster beside it instead"),
     known(0, b"#vrml", "VRML", MESH),
     known(0, b"solid ", "an STL mesh", MESH),
     known(0, b"qgis", "a QGIS project", "export the layer as GeoTIFF"),
@@ -151,8 +160,13 @@ impl Known {
 
     /// The format of a folder that is one dataset, if it is one that is not read.
     pub fn of_folder(folder: &Path) -> Option<&'static Self> {
-        let is_geodatabase = folder.join("a00000001.gdbtable").is_file();
-        is_geodatabase.then_some(&GEODATABASE)
+        let holds = |files: &[&str]| files.iter().any(|file| folder.join(file).is_file());
+        match () {
+            () if holds(&["a00000001.gdbtable"]) => Some(&GEODATABASE),
+            () if holds(&[".zgroup", ".zarray", "zarr.json"]) => Some(&ZARR),
+            () if holds(&["hdr.adf"]) => Some(&COVERAGE),
+            () => None,
+        }
     }
 
     /// The error text: what was found, and what to do.

@@ -19,6 +19,19 @@ pub(super) struct Part {
     pub raster: Raster,
 }
 
+impl Part {
+    /// Rank among rasters of the same samples, lowest for heights: the name ends in a word for them, as in
+    /// `N42E001_dem.tif` beside `N42E001_num.tif`, and a sample has more than 8 bits.
+    fn unlikeliness(&self) -> u32 {
+        const HEIGHTS: [&str; 8] = ["dem", "dtm", "dsm", "dhm", "dgm", "hgt", "elevation", "height"];
+        let file = self.name.rsplit(['/', '\\']).next().unwrap_or_default().to_lowercase();
+        let stem = file.rsplit_once('.').map_or(file.as_str(), |(stem, _)| stem);
+        let last = stem.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+        let is_byte = ["u8", "i8"].contains(&self.raster.sample_type.as_str());
+        u32::from(!HEIGHTS.contains(&last)) * 2 + u32::from(is_byte)
+    }
+}
+
 /// Rasters read one after the other, together within the limit of samples.
 #[derive(Default)]
 pub(super) struct Parts {
@@ -55,22 +68,26 @@ impl Parts {
 
     /// Removes companions from the rasters of one folder or archive, which begin at `begin`.
     ///
-    /// A companion has no position beside rasters that have one, as a preview. Or it covers the samples of an earlier
-    /// raster, as a mask or a count.
+    /// A companion has no position beside rasters that have one, as a preview. Or it covers the samples of a raster
+    /// that is more likely one of heights, as a mask or a count.
     pub fn leave_out_companions(&mut self, begin: usize) {
         let group = self.list.split_off(begin);
         let any_placed = group.iter().any(|part| part.raster.place.is_some());
-        for part in group {
-            let place = part.raster.place.as_ref();
-            let same = |other: &&Part| place.is_some() && covers_same(&other.raster, &part.raster);
-            if any_placed && place.is_none() {
-                self.warnings.push(format!("{} says no position and is left out", part.name));
-            } else if let Some(other) = self.list[begin..].iter().find(same) {
-                let warning = format!("{} covers the same samples as {} and is left out", part.name, other.name);
-                self.warnings.push(warning);
-            } else {
-                self.list.push(part);
-                continue;
+        let rank = |at: usize| (group[at].unlikeliness(), at);
+        let preferred = |at: usize| {
+            let mut others = (0..group.len()).filter(|&other| rank(other) < rank(at));
+            others.find(|&other| covers_same(&group[other].raster, &group[at].raster))
+        };
+        let left_out = |at: usize| match preferred(at) {
+            _ if any_placed && group[at].raster.place.is_none() => Some("says no position".to_owned()),
+            Some(other) => Some(format!("covers the same samples as {}", group[other].name)),
+            None => None,
+        };
+        let reasons: Vec<_> = (0..group.len()).map(left_out).collect();
+        for (part, reason) in group.into_iter().zip(reasons) {
+            match reason {
+                Some(reason) => self.warnings.push(format!("{} {reason} and is left out", part.name)),
+                None => self.list.push(part),
             }
         }
         self.samples = self.list.iter().map(|part| part.raster.samples.len() as u64).sum();

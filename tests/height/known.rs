@@ -70,10 +70,17 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
 
 #[test]
 fn folders_that_are_one_dataset_are_named() {
-    let folder = tempdir().unwrap();
-    std::fs::write(folder.path().join("a00000001.gdbtable"), [3; 64]).unwrap();
-    let error = load(folder.path(), &Options::default()).unwrap_err().to_string();
-    assert!(error.contains("Esri file geodatabase") && error.contains("gdal_translate"), "{error}");
+    for (file, name) in [
+        ("a00000001.gdbtable", "Esri file geodatabase"),
+        (".zarray", "Zarr"),
+        ("zarr.json", "Zarr"),
+        ("hdr.adf", "Arc/Info binary grid"),
+    ] {
+        let folder = tempdir().unwrap();
+        std::fs::write(folder.path().join(file), [3; 64]).unwrap();
+        let error = load(folder.path(), &Options::default()).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains("gdal_translate"), "{error}");
+    }
 }
 
 #[test]

@@ -266,6 +266,26 @@ fn companions_are_left_out_with_a_warning() {
     assert_eq!((loaded.field.size(), loaded.format), ([5, 4], "PNG"));
 }
 
+/// As in packages of ASTER, AW3D30 and Copernicus: names or types say which file has the heights.
+#[test]
+fn of_files_of_the_same_samples_the_heights_are_read() {
+    let byte = TiffFile { bits: 8, format: 1, ..at(0, 0) };
+    let (heights, other) = (at(0, 0).bytes(|i, _| 100.0 + i as f64), at(0, 0).bytes(|_, _| 9.0));
+    for (others, name) in [
+        (["AUXFILES/x_DSM_10_EDM.tif", "AUXFILES/x_DSM_10_HEM.tif"], "DEM/x_DSM_10_DEM.tif"),
+        (["x_MSK.tif", "x_STK.tif"], "y_DSM.tif"),
+        (["x_num.tif", "x_swb.tif"], "x_dem.tif"),
+    ] {
+        let files = [(others[0], &byte.bytes(|_, _| 5.0)[..]), (others[1], &other[..]), (name, &heights[..])];
+        let loaded = load_bytes("a.zip", &tiny::zip(&files), &Options::default()).unwrap();
+        assert_eq!((loaded.field.height(3, 0), loaded.warnings.len()), (103.0, 2), "{name}: {:?}", loaded.warnings);
+        assert!(loaded.sources[0].file.ends_with(name), "{:?}", loaded.sources);
+    }
+    let files = [("a.tif", &byte.bytes(|_, _| 5.0)[..]), ("b.tif", &heights[..])];
+    let loaded = load_bytes("a.zip", &tiny::zip(&files), &Options::default()).unwrap();
+    assert_eq!(loaded.field.height(3, 0), 103.0);
+}
+
 #[test]
 fn folders_and_archives_without_heights_say_what_they_hold() {
     let files = [("scene.nc", b"CDF\x01and so on".to_vec()), ("land.hgt", vec![0; 1000]), ("a.md", b"text".to_vec())];
