@@ -46,7 +46,7 @@ static ZARR: Known = known(0, b"", "a Zarr array", RASTER);
 static COVERAGE: Known = known(0, b"", "an Arc/Info binary grid", RASTER);
 static GEODATABASE: Known = known(0, b"", "an Esri file geodatabase", PACKAGE);
 
-/// Formats by magic bytes; the first match counts.
+/// Formats by magic bytes; the first match counts, of at least four bytes before shorter ones.
 static BINARY: &[Known] = &[
     known(0, b"CDF\x01", "NetCDF", VARIABLE),
     known(0, b"CDF\x02", "NetCDF", VARIABLE),
@@ -149,13 +149,21 @@ static TEXT: &[Known] = &[
 ];
 
 impl Known {
+    /// The format that a file begins with beyond doubt, by at least four bytes.
+    pub fn certain(head: &[u8]) -> Option<&'static Self> {
+        BINARY.iter().find(|known| known.magic.len() >= 4 && known.begins(head)).or_else(|| text(head))
+    }
+
     /// The format that a file begins with, if it is one that is not read.
     pub fn of(head: &[u8], len: u64) -> Option<&'static Self> {
         if len == 0 {
             return Some(&EMPTY);
         }
-        let is = |known: &&Known| head.get(known.at..).is_some_and(|rest| rest.starts_with(known.magic));
-        BINARY.iter().find(is).or_else(|| text(head))
+        Self::certain(head).or_else(|| BINARY.iter().find(|known| known.begins(head)))
+    }
+
+    fn begins(&self, head: &[u8]) -> bool {
+        head.get(self.at..).is_some_and(|rest| rest.starts_with(self.magic))
     }
 
     /// The format of a folder that is one dataset, if it is one that is not read.

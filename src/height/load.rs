@@ -320,7 +320,7 @@ impl Kind {
             _ if bil::is_header(text) => Kind::Header,
             _ if asc::is_header(text) => Kind::Asc,
             _ if usgs_dem::is_header(head) => Kind::UsgsDem,
-            _ if has_header => Kind::Bil,
+            _ if has_header => Known::certain(head).map_or(Kind::Bil, Kind::Known),
             _ if hgt::size(len).is_some() => Kind::Hgt,
             _ => Known::of(head, len).map_or(Kind::Unknown, Kind::Known),
         }
