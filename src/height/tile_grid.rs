@@ -87,7 +87,7 @@ impl TileGrid {
     }
 
     /// The tile's column from the west and row from the north, if it lies within a zoom level.
-    pub fn from_north_west(&self, zoom: u32, [x, y]: [u32; 2]) -> Option<[u32; 2]> {
+    pub fn tile_at(&self, zoom: u32, [x, y]: [u32; 2]) -> Option<[u32; 2]> {
         // A geodetic grid has two tiles side by side at level 0.
         let columns = (1u64 << zoom) * if self.other.is_some() { 2 } else { 1 };
         let is_tile = u64::from(x) < columns && y < 1 << zoom;

@@ -98,7 +98,7 @@ pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
     {
         for (x, _, x_path) in numbered(&zoom_path)?.into_iter().filter(|(.., path)| path.is_dir()) {
             for (y, double, file) in numbered(&x_path)?.into_iter().filter(|(.., path)| is_picture(path)) {
-                if let Some(tile) = grid.from_north_west(zoom, [x, y]) {
+                if let Some(tile) = grid.tile_at(zoom, [x, y]) {
                     levels.entry((zoom, double)).or_default().insert(tile, file);
                 }
             }

@@ -72,10 +72,12 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
 #[test]
 fn a_header_beside_does_not_hide_a_format() {
     let bil = tiny::all().into_iter().find(|file| file.name == "esri.bil").unwrap();
-    for magic in [&b"CDF\x01"[..], b"EHFA_HEADER_TAG", b"SQLite format 3\0", b"<VRTDataset>"] {
+    for magic in [&b"CDF\x01"[..], b"EHFA_HEADER_TAG", b"SQLite format 3\0"] {
         let error = bil.load_as(&[magic, &bil.bytes].concat(), bil.hdr.as_deref()).unwrap_err().to_string();
         assert!(error.contains("content: expected a height format"), "{error}");
     }
+    let text = b"<VRTDataset rasterXSize=\"5\" rasterYSize=\"4\"></VRTDataset>";
+    assert!(bil.load_as(text, bil.hdr.as_deref()).unwrap_err().to_string().contains("virtual raster"));
     // Two or three bytes may as well be a height: -257 m.
     assert_eq!(bil.load_as(&[b"\xff\xfe", &bil.bytes[2..]].concat(), bil.hdr.as_deref()).unwrap().format, "ESRI BIL");
 }
