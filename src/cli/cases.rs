@@ -168,7 +168,7 @@ fn of_files(
     let paths =
         if args.kit { kit::REAL_PATHS.iter().map(|name| name.to_string()).collect() } else { args.path.clone() };
     for file in &args.terrain {
-        let field = Arc::new(args.reading.load(common, file)?.field);
+        let field = Arc::new(args.reading.load(common, std::slice::from_ref(file))?.field);
         endless::need_samples(&field, "bench")?;
         let name = Path::new(file).file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned());
         let terrain = Terrain { name, size: field.size(), spacing_m: field.spacing };

@@ -32,7 +32,14 @@ fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     }
     let field = Field::endless(Arc::new(Bezier::new(seed, LAYERS)));
     let sample_type = "f32".to_string();
-    Ok(Loaded { field, format: "endless", sample_type, exact_in_16_bit: false, warnings: Vec::new() })
+    Ok(Loaded {
+        field,
+        format: "endless",
+        sample_type,
+        exact_in_16_bit: false,
+        warnings: Vec::new(),
+        sources: Vec::new(),
+    })
 }
 
 /// Refuses a land without samples for what looks at every sample.

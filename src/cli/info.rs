@@ -9,14 +9,14 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
 use super::{Common, Outcome, plan, report, working_set};
-use crate::height::Loaded;
+use crate::height::{Loaded, SourceFile};
 
 /// Arguments.
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// A height file of any supported format, a directory of web-map tiles, or `demo`.
+    /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; or `demo`.
     #[arg(required_unless_present = "devices")]
-    pub terrain: Option<String>,
+    pub terrain: Vec<String>,
     /// How heights are read.
     #[command(flatten)]
     pub reading: ReadArgs,
@@ -60,6 +60,8 @@ pub struct Info {
     exact_in_16_bit: bool,
     /// Largest difference between the two ways to split a cell, metres.
     cell_ambiguity_m: f32,
+    /// The files that the heights come from; a later one overlies an earlier one.
+    sources: Vec<SourceFile>,
     warnings: Vec<String>,
 }
 
@@ -83,6 +85,7 @@ impl Info {
             sample_type: loaded.sample_type.clone(),
             exact_in_16_bit: loaded.exact_in_16_bit,
             cell_ambiguity_m: field.cell_ambiguity(),
+            sources: loaded.sources.clone(),
             warnings: loaded.warnings.clone(),
         }
     }
@@ -93,10 +96,10 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
     if args.devices {
         return devices(common);
     }
-    let Some(terrain) = &args.terrain else {
+    if args.terrain.is_empty() {
         bail!("info: expected a terrain or --devices");
-    };
-    let loaded = args.reading.load(common, terrain)?;
+    }
+    let loaded = args.reading.load(common, &args.terrain)?;
     if let Some(path) = &args.working_set {
         let field = Arc::new(loaded.field);
         let view = args.view.build(&field, args.technique.tolerance()?)?;
@@ -108,7 +111,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);
     }
-    plan::run(common, args, terrain, &Arc::new(loaded.field))
+    plan::run(common, args, &args.terrain.join(" "), &Arc::new(loaded.field))
 }
 
 #[cfg(not(feature = "vulkan"))]

@@ -15,6 +15,7 @@ pub mod redraw;
 pub mod render;
 pub mod report;
 pub mod scene;
+mod several;
 pub mod stress;
 pub mod synth;
 #[cfg(feature = "viewer")]

@@ -77,7 +77,7 @@ struct Capture {
 pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let field = Arc::new(args.terrain.load(common)?.field);
     endless::need_samples(&field, "profile")?;
-    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let (look, overlay) = args.look.build(&args.terrain.name())?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
     let gpu = open(common, false)?;
@@ -96,7 +96,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let document = Document {
         schema: rows::SCHEMA,
         program: format!("cuesta {}", env!("CARGO_PKG_VERSION")),
-        terrain: args.terrain.terrain.clone(),
+        terrain: args.terrain.name(),
         technique: args.technique.technique.clone(),
         metric: args.technique.metric.name(),
         tolerance_px: view.tolerance.px,

@@ -137,7 +137,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     if args.measure {
         endless::need_samples(&field, "--measure")?;
     }
-    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let (look, overlay) = args.look.build(&args.terrain.name())?;
     ensure!(args.time.is_finite(), "--time {}: expected seconds", args.time);
     let look = look.after(args.time);
     let view = args.view.build(&field, args.technique.tolerance()?)?;

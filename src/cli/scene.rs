@@ -9,9 +9,9 @@ use glam::DVec3;
 
 use super::numbers::{nodata, numbers, spacing};
 use super::whole::Whole;
-use super::{Common, endless, report};
+use super::{Common, endless, report, several};
 use crate::height::cave::Cave;
-use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load, load_bytes};
+use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Forced, Look};
 use crate::view::{Lens, Metric, Tolerance, View};
@@ -25,8 +25,10 @@ const FINEST: f64 = 1e-9;
 /// Where heights come from.
 #[derive(Args, Debug, Clone)]
 pub struct TerrainArgs {
-    /// A height file of any supported format, a directory of web-map tiles, `demo`, or `endless[:SEED]`.
-    pub terrain: String,
+    /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; `demo`; or
+    /// `endless[:SEED]`. Where several files have data the last one counts.
+    #[arg(required = true)]
+    pub terrain: Vec<String>,
     /// How they are read.
     #[command(flatten)]
     pub reading: ReadArgs,
@@ -273,16 +275,16 @@ fn encoding(text: &str) -> Result<Encoding, String> {
 
 impl ReadArgs {
     /// Reads a field, and the ceiling over it if there is one, and says what the reader warns of.
-    pub fn load(&self, common: &Common, terrain: &str) -> Result<Loaded> {
+    pub fn load(&self, common: &Common, terrain: &[String]) -> Result<Loaded> {
         let mut loaded = self.load_alone(common, terrain)?;
         if let Some(file) = &self.ceiling {
-            let ceiling = self.load_alone(common, file)?;
+            let ceiling = self.load_alone(common, std::slice::from_ref(file))?;
             loaded.field = Field::clone(Cave::new(&loaded.field, &ceiling.field, file)?.floor());
         }
         Ok(loaded)
     }
 
-    fn load_alone(&self, common: &Common, terrain: &str) -> Result<Loaded> {
+    fn load_alone(&self, common: &Common, terrain: &[String]) -> Result<Loaded> {
         let options = Options {
             spacing: self.spacing,
             height_scale: self.height_scale,
@@ -297,16 +299,18 @@ impl ReadArgs {
             zoom: self.zoom,
             max_samples: self.max_samples,
         };
-        if let Some(land) = endless::named(terrain, &options) {
+        let only = several::only(terrain)?;
+        if let Some(land) = only.and_then(|only| endless::named(only, &options)) {
             return land;
         }
-        let _spinner = report::spinner(common, format!("reading {terrain}"));
-        let mut loaded = if is_demo(terrain) {
+        let _spinner = report::spinner(common, format!("reading {}", terrain.join(" ")));
+        let is_demo = only.is_some_and(is_demo);
+        let mut loaded = if is_demo {
             load_bytes("demo", demo::PICTURE, &demo_options(options))?
         } else {
-            load(Path::new(terrain), &options)?
+            load_all(&terrain.iter().map(Path::new).collect::<Vec<_>>(), &options)?
         };
-        loaded.field.source = (!self.no_cache && !is_demo(terrain)).then(|| terrain.into());
+        loaded.field.source = (!self.no_cache && !is_demo).then(|| several::cache_path(terrain).into());
         for warning in &loaded.warnings {
             report::warn(common, warning);
         }
@@ -319,10 +323,15 @@ impl TerrainArgs {
     pub fn load(&self, common: &Common) -> Result<Loaded> {
         self.reading.load(common, &self.terrain)
     }
+
+    /// The names of all files, as on the command line.
+    pub fn name(&self) -> String {
+        self.terrain.join(" ")
+    }
 }
 
 /// Whether it is the embedded terrain, which has an overlay of its own.
-fn is_demo(terrain: &str) -> bool {
+pub(super) fn is_demo(terrain: &str) -> bool {
     terrain == "demo" && !Path::new(terrain).exists()
 }
 

@@ -46,7 +46,14 @@ pub fn run(common: &Common, args: &SynthArgs) -> Result<Outcome> {
     save::save(&field, &args.output)?;
     let coded = matches!(field.samples(), Samples::Coded { .. });
     let sample_type = if coded { "u16" } else { "f32" }.to_string();
-    let loaded = Loaded { field, format: "synth", sample_type, exact_in_16_bit: coded, warnings: Vec::new() };
+    let loaded = Loaded {
+        field,
+        format: "synth",
+        sample_type,
+        exact_in_16_bit: coded,
+        warnings: Vec::new(),
+        sources: Vec::new(),
+    };
     report::print(common, &Info::of(&loaded))?;
     Ok(Outcome::Done)
 }

@@ -87,15 +87,15 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     let technique = args.technique.settings()?;
     report::warn_of_idle(common, technique.0, &technique.1);
     let field = Arc::new(args.terrain.load(common)?.field);
-    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let (look, overlay) = args.look.build(&args.terrain.name())?;
     let summary = viewer::run(&Setup {
-        name: args.terrain.terrain.clone(),
+        name: args.terrain.name(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
         field,
         near: args.view.near,
         technique,
         choices: args.technique.settings.clone(),
-        overlay: overlay.or(args.look.picture(&args.terrain.terrain)?),
+        overlay: overlay.or(args.look.picture(&args.terrain.name())?),
         look,
         choice: render::choice(common),
         validate: common.validate,

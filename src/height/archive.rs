@@ -1,84 +1,188 @@
-//! Height files inside zip and gzip files.
+//! Height files inside zip, tar and gzip files.
 
-use std::io::{Cursor, Read};
+use std::{
+    borrow::Cow,
+    io::{Cursor, Read},
+};
 
 use flate2::read::MultiGzDecoder;
 use zip::ZipArchive;
 
 use super::{
     Error,
+    folder::{LeftOut, is_companion},
     load::{self, HEAD_BYTES, Kind, Options, Source},
-    raster::Raster,
+    mosaic::Parts,
 };
 
 /// The most bytes a member may unpack to; larger files are to be unpacked first.
 const UNPACKED_BYTES: u64 = 1 << 31;
 /// The most members looked at.
 const MEMBERS: usize = 4096;
-/// Ends of the names of small files that describe a member.
-const SIDECARS: [&str; 10] = [".hdr", ".prj", ".aux.xml", ".wld", ".tfw", ".tifw", ".tiffw", ".pgw", ".pngw", ".blw"];
-/// The most bytes of a header or projection beside a member.
+/// The most bytes of a text beside a member.
 const SIBLING_BYTES: u64 = 1 << 16;
 
-/// Reads the file inside a gzip file.
-pub(super) fn read_gzip(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+/// Reads the file inside a gzip file, or the height files of a tar file inside it.
+pub(super) fn gather_gzip(source: &mut Source, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    let (name, limit) = (source.name, limit(options));
+    let error = |e| Error::new(name, "gzip data", e);
+    let mut unpacked = MultiGzDecoder::new(&mut source.reader);
     let mut bytes = Vec::new();
-    let limit = limit(options);
-    let read = MultiGzDecoder::new(&mut source.reader).take(limit + 1).read_to_end(&mut bytes);
-    read.map_err(|e| source.error("gzip data", e))?;
-    read_member(source.name, &bytes, limit, source.siblings, options)
+    unpacked.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(error)?;
+    if Kind::of(&bytes, bytes.len() as u64, false) == Kind::Tar {
+        return gather_members(
+            name,
+            &mut tar_members(name, &mut Cursor::new(bytes).chain(unpacked), limit)?,
+            options,
+            parts,
+        );
+    }
+    unpacked.take(limit + 1 - bytes.len() as u64).read_to_end(&mut bytes).map_err(error)?;
+    gather_member(name, &bytes, limit, source.siblings, options, parts)
 }
 
-/// Reads the largest height file inside a zip file.
-pub(super) fn read_zip(source: &mut Source, options: &Options) -> Result<Raster, Error> {
-    let name = source.name;
-    let error = |place: &str, e: &dyn std::fmt::Display| Error::new(name, format!("zip {place}"), e);
-    let mut archive = ZipArchive::new(&mut source.reader).map_err(|e| error("directory", &e))?;
-    let mut members = Vec::new();
-    for index in 0..archive.len().min(MEMBERS) {
-        let member = archive.by_index(index).map_err(|e| error(&format!("member {index}"), &e))?;
-        if member.is_file() {
-            members.push((member.size(), index, String::from_utf8_lossy(member.name_raw()).into_owned()));
-        }
-    }
-    members.sort_by_key(|&(size, index, _)| (std::cmp::Reverse(size), index));
+/// Reads the height files inside a tar file.
+pub(super) fn gather_tar(source: &mut Source, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    let mut members = tar_members(source.name, &mut source.reader, limit(options))?;
+    gather_members(source.name, &mut members, options, parts)
+}
 
-    let mut unpack = |index: usize, limit: u64| -> Result<Vec<u8>, Error> {
-        let member = archive.by_index(index).map_err(|e| error(&format!("member {index}"), &e))?;
-        let mut bytes = Vec::new();
-        member.take(limit).read_to_end(&mut bytes).map_err(|e| error(&format!("member {index}"), &e))?;
-        Ok(bytes)
-    };
-    let mut texts = Vec::new();
-    for (_, index, member) in members.iter().filter(|(.., member)| is_text(member)) {
-        texts.push((member.clone(), unpack(*index, SIBLING_BYTES)?));
-    }
-    for (size, index, member) in members.iter().filter(|(.., member)| !is_text(member)) {
-        let sibling = |extension: &str| {
-            let stem = member.rsplit_once('.').map_or(member.as_str(), |(stem, _)| stem);
-            let fits = |other: &str| [stem, member].iter().any(|stem| is_stem(other, stem, extension));
-            texts.iter().find(|(other, _)| other != member && fits(other)).map(|(_, text)| text.clone())
-        };
-        let head = unpack(*index, HEAD_BYTES)?;
-        match Kind::of(&head, *size, sibling("hdr").is_some()) {
-            Kind::Unknown | Kind::Picture(_) | Kind::Header | Kind::Zip | Kind::Gzip => continue,
-            _ => {
-                let limit = limit(options);
-                return read_member(&format!("{name}/{member}"), &unpack(*index, limit + 1)?, limit, &sibling, options);
+/// Reads the height files inside a zip file.
+pub(super) fn gather_zip(source: &mut Source, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    let mut members = Zip::open(source.name, &mut source.reader)?;
+    gather_members(source.name, &mut members, options, parts)
+}
+
+/// A file in an archive.
+struct Member {
+    name: String,
+    /// Bytes once unpacked, as the archive says.
+    len: u64,
+    index: usize,
+}
+
+/// The files in an archive.
+trait Members {
+    fn list(&self) -> &[Member];
+    /// The first bytes of a file, at most `limit`.
+    fn unpack(&mut self, index: usize, limit: u64) -> Result<Cow<'_, [u8]>, Error>;
+}
+
+struct Zip<'a> {
+    name: &'a str,
+    archive: ZipArchive<&'a mut dyn load::Input>,
+    list: Vec<Member>,
+}
+
+impl<'a> Zip<'a> {
+    fn open(name: &'a str, reader: &'a mut dyn load::Input) -> Result<Self, Error> {
+        let mut archive = ZipArchive::new(reader).map_err(|e| Error::new(name, "zip directory", e))?;
+        let mut list = Vec::new();
+        for index in 0..archive.len().min(MEMBERS) {
+            let member = archive.by_index(index).map_err(|e| Error::new(name, format!("zip member {index}"), e))?;
+            if member.is_file() {
+                let name = String::from_utf8_lossy(member.name_raw()).into_owned();
+                list.push(Member { name, len: member.size(), index });
             }
         }
+        list.sort_by(|a, b| (&a.name, a.index).cmp(&(&b.name, b.index)));
+        Ok(Self { name, archive, list })
     }
-    Err(error("directory", &format!("expected a height file, found none among {} members", members.len())))
 }
 
-fn is_text(member: &str) -> bool {
-    let lower = member.to_lowercase();
-    SIDECARS.iter().any(|extension| lower.ends_with(extension))
+impl Members for Zip<'_> {
+    fn list(&self) -> &[Member] {
+        &self.list
+    }
+
+    fn unpack(&mut self, index: usize, limit: u64) -> Result<Cow<'_, [u8]>, Error> {
+        let error = |e: &dyn std::fmt::Display| Error::new(self.name, format!("zip member {index}"), e);
+        let member = self.archive.by_index(index).map_err(|e| error(&e))?;
+        let mut bytes = Vec::new();
+        member.take(limit).read_to_end(&mut bytes).map_err(|e| error(&e))?;
+        Ok(bytes.into())
+    }
 }
 
-fn is_stem(other: &str, stem: &str, extension: &str) -> bool {
-    let rest = other.strip_prefix(stem).and_then(|rest| rest.strip_prefix('.'));
-    rest.is_some_and(|rest| rest.eq_ignore_ascii_case(extension))
+/// The files of a tar file, which is read once from its beginning.
+struct Tar {
+    list: Vec<Member>,
+    bytes: Vec<Vec<u8>>,
+}
+
+/// Unpacks the files of a tar file that may be needed, together no more than `limit` bytes.
+fn tar_members(name: &str, reader: &mut dyn Read, limit: u64) -> Result<Tar, Error> {
+    let error = |e| Error::new(name, "tar data", e);
+    let (mut list, mut bytes, mut left) = (Vec::new(), Vec::new(), limit);
+    let mut archive = tar::Archive::new(reader);
+    for entry in archive.entries().map_err(error)?.take(MEMBERS) {
+        let mut entry = entry.map_err(error)?;
+        let member = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
+        if !entry.header().entry_type().is_file() {
+            continue;
+        }
+        let (len, mut content) = (entry.size(), Vec::new());
+        entry.by_ref().take(HEAD_BYTES).read_to_end(&mut content).map_err(error)?;
+        if !matches!(Kind::of(&content, len, false), Kind::Known(_)) {
+            let more = if is_companion(&member) { SIBLING_BYTES.min(left) } else { left };
+            entry.take(more + 1).read_to_end(&mut content).map_err(error)?;
+        }
+        left = left.checked_sub(content.len() as u64).ok_or_else(|| too_long(name, limit))?;
+        list.push(Member { name: member, len, index: bytes.len() });
+        bytes.push(content);
+    }
+    list.sort_by(|a, b| (&a.name, a.index).cmp(&(&b.name, b.index)));
+    Ok(Tar { list, bytes })
+}
+
+impl Members for Tar {
+    fn list(&self) -> &[Member] {
+        &self.list
+    }
+
+    fn unpack(&mut self, index: usize, limit: u64) -> Result<Cow<'_, [u8]>, Error> {
+        let bytes = &self.bytes[index];
+        Ok(bytes[..bytes.len().min(limit as usize)].into())
+    }
+}
+
+/// Reads the height files of an archive in the order of their names.
+fn gather_members(name: &str, members: &mut dyn Members, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    let list: Vec<(String, u64, usize)> = members.list().iter().map(|m| (m.name.clone(), m.len, m.index)).collect();
+    let mut texts = Vec::new();
+    for (member, _, index) in list.iter().filter(|(member, ..)| is_companion(member)) {
+        texts.push((member.clone(), members.unpack(*index, SIBLING_BYTES)?.into_owned()));
+    }
+    let (begin, mut left_out) = (parts.len(), LeftOut::default());
+    for (member, len, index) in list.iter().filter(|(member, ..)| !is_companion(member)) {
+        let sibling = |extension: &str| sibling(&texts, member, extension);
+        let head = members.unpack(*index, HEAD_BYTES)?;
+        let kind = Kind::of(&head, *len, sibling("hdr").is_some());
+        if !kind.holds_heights() || matches!(kind, Kind::Zip | Kind::Gzip | Kind::Tar) {
+            left_out.add(member, kind);
+            continue;
+        }
+        let limit = limit(options);
+        let bytes = members.unpack(*index, limit + 1)?;
+        gather_member(&format!("{name}/{member}"), &bytes, limit, &sibling, options, parts)?;
+    }
+    if parts.len() == begin {
+        let what = format!("expected a height file, found none among {} members{}", list.len(), left_out.list());
+        return Err(Error::new(name, "archive", what));
+    }
+    parts.leave_out_companions(begin);
+    parts.warnings.extend(left_out.warning(name));
+    Ok(())
+}
+
+/// The text beside a member that has another extension: `a.hdr` or `a.bil.hdr`.
+fn sibling(texts: &[(String, Vec<u8>)], member: &str, extension: &str) -> Option<Vec<u8>> {
+    let stem = member.rsplit_once('.').map_or(member, |(stem, _)| stem);
+    let is_beside = |other: &str| {
+        let rests = [stem, member].into_iter().filter_map(|stem| other.strip_prefix(stem)?.strip_prefix('.'));
+        other != member && { rests }.any(|rest| rest.eq_ignore_ascii_case(extension))
+    };
+    texts.iter().find(|(other, _)| is_beside(other)).map(|(_, text)| text.clone())
 }
 
 /// No format needs more than 16 bytes a sample, but for texts of unusual length.
@@ -86,20 +190,23 @@ fn limit(options: &Options) -> u64 {
     options.max_samples.saturating_mul(16).clamp(1 << 16, UNPACKED_BYTES)
 }
 
-fn read_member(
+fn too_long(name: &str, limit: u64) -> Error {
+    Error::new(name, "unpacked length", format!("expected at most {limit} bytes, found more: unpack it first"))
+}
+
+fn gather_member(
     name: &str,
     bytes: &[u8],
     limit: u64,
     siblings: &dyn Fn(&str) -> Option<Vec<u8>>,
     options: &Options,
-) -> Result<Raster, Error> {
+    parts: &mut Parts,
+) -> Result<(), Error> {
     let len = bytes.len() as u64;
     if len > limit {
-        return Err(Error::new(name, "unpacked length", format!("expected at most {limit} bytes, found more")));
+        return Err(too_long(name, limit));
     }
     let kind = Kind::of(&bytes[..bytes.len().min(HEAD_BYTES as usize)], len, siblings("hdr").is_some());
-    if matches!(kind, Kind::Zip | Kind::Gzip) {
-        return Err(Error::new(name, "content", "expected a height file, found an archive within an archive"));
-    }
-    load::read(&mut Source { name, reader: &mut Cursor::new(bytes), len, siblings }, kind, options)
+    let mut source = Source { name, reader: &mut Cursor::new(bytes), len, siblings };
+    parts.add(name, options, |options| load::read(&mut source, kind, options))
 }

@@ -6,7 +6,7 @@ use super::{
     georef::Grid,
     load::{Options, Source},
     raster::Raster,
-    text::Words,
+    text::{self, Words},
 };
 
 /// The keys of a header, lower case.
@@ -112,7 +112,6 @@ fn read_heights(source: &mut Source, words: &mut Words, count: usize) -> Result<
 }
 
 fn number(source: &Source, words: &Words) -> Result<f64, Error> {
-    let wrong =
-        |_| source.error(format!("line {}", words.line), format!("expected a number, found {:?}", words.word()));
-    words.word().parse().map_err(wrong)
+    let wrong = || source.error(format!("line {}", words.line), format!("expected a number, found {:?}", words.word()));
+    text::number(words.word()).ok_or_else(wrong)
 }

@@ -16,6 +16,7 @@ use super::{
     raw::Rows,
     sample::{Order, SampleType},
     sidecar::Georeference,
+    text,
 };
 
 /// Keys that a header of bare samples has and an ASCII grid lacks.
@@ -96,7 +97,8 @@ impl Values<'_> {
 
     pub fn number<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>, Error> {
         let wrong = |text| self.error(key, format!("expected a number in range, found {text:?}"));
-        self.text(key).map(|text| text.parse().map_err(|_| wrong(text))).transpose()
+        let parse = |text: &str| text.parse().ok().or_else(|| text::number(text)?.to_string().parse().ok());
+        self.text(key).map(|text| parse(text).ok_or_else(|| wrong(text))).transpose()
     }
 
     pub fn required<T: std::str::FromStr>(&self, key: &str) -> Result<T, Error> {

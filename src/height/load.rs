@@ -6,8 +6,11 @@ use std::{
     path::Path,
 };
 
+use serde::Serialize;
+
 use super::{
-    Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, sidecar, terrain_rgb, tiles, usgs_dem,
+    Error, Field, archive, asc, bil, folder, geotiff, hgt, known_formats::Known, mosaic::Parts, png, raster::Raster,
+    raw, sidecar, terrain_rgb, text, tiles, usgs_dem,
 };
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
@@ -82,29 +85,48 @@ pub struct Loaded {
     pub exact_in_16_bit: bool,
     /// What the user should know, one sentence each.
     pub warnings: Vec<String>,
+    /// The files that the heights come from, in the order in which a later one overlies an earlier one.
+    pub sources: Vec<SourceFile>,
 }
 
-/// Reads a file or a directory of tiles.
+/// A file that heights come from, and where it lies in the field before crop.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SourceFile {
+    /// The file's name; of a member of an archive after the archive's name.
+    pub file: String,
+    /// Name of the file format.
+    pub format: &'static str,
+    /// Column and row of its north-west sample.
+    pub at: [u32; 2],
+    /// Samples along (x, z).
+    pub size: [u32; 2],
+}
+
+impl SourceFile {
+    /// The file of a raster whose north-west sample lies at a column and row.
+    pub(super) fn of(file: &str, raster: &Raster, at: [u32; 2]) -> Self {
+        Self { file: file.to_owned(), format: raster.format, at, size: raster.size }
+    }
+}
+
+/// Reads a file, a directory of tiles, or a folder of height files.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
-    let name = path.display().to_string();
-    if path.is_dir() {
-        return tiles::read(path, options)?.finish(&name, options);
-    }
-    let siblings = |extension: &str| sibling(path, extension);
-    let (file, len) = open(path)?;
-    let mut source = Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings };
-    match source.kind(options)? {
-        Kind::Header => {
-            let data = bil::data_beside(path)
-                .ok_or_else(|| source.error("data", "expected a data file beside the header, found none"))?;
-            let (file, len) = open(&data)?;
-            let name = data.display().to_string();
-            let siblings = |extension: &str| sibling(&data, extension);
-            let mut source = Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings };
-            read(&mut source, Kind::Bil, options)?.finish(&name, options)
+    load_all(&[path], options)
+}
+
+/// Reads files and folders as one field: a mosaic of one grid, where a later file overlies an earlier one and what
+/// lies in none is a hole.
+pub fn load_all(paths: &[&Path], options: &Options) -> Result<Loaded, Error> {
+    let mut parts = Parts::default();
+    for path in paths {
+        match path.is_dir() {
+            true => gather_folder(path, options, &mut parts)?,
+            false => gather_file(path, options, &mut parts)?,
         }
-        kind => read(&mut source, kind, options)?.finish(&name, options),
     }
+    let first = paths.first().map_or_else(String::new, |path| path.display().to_string());
+    let name = if paths.len() > 1 { format!("{first} and {} more", paths.len() - 1) } else { first };
+    finish(parts, &name, options)
 }
 
 /// Reads a file held in memory; `name` is for messages, and for the position of SRTM tiles.
@@ -123,17 +145,63 @@ pub fn load_bytes_with(
     let len = bytes.len() as u64;
     let mut source = Source { name, reader: &mut Cursor::new(bytes), len, siblings };
     let kind = source.kind(options)?;
-    read(&mut source, kind, options)?.finish(name, options)
+    let mut parts = Parts::default();
+    gather(&mut source, kind, options, &mut parts)?;
+    finish(parts, name, options)
+}
+
+fn finish(parts: Parts, name: &str, options: &Options) -> Result<Loaded, Error> {
+    let is_mosaic = parts.len() > 1;
+    let (raster, sources) = parts.join(name, options)?;
+    // Each file's own holes are made by then, and its values need not be those of the others.
+    let nodata = options.nodata.filter(|_| !is_mosaic);
+    let loaded = raster.finish(name, &Options { nodata, ..options.clone() })?;
+    Ok(Loaded { sources, ..loaded })
+}
+
+fn gather_folder(path: &Path, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    if let Some(known) = Known::of_folder(path) {
+        return Err(Error::new(path.display().to_string(), "content", known.what()));
+    }
+    match tiles::scan(path)? {
+        None => folder::gather(path, options, parts),
+        Some(tiles) => parts.add(&path.display().to_string(), options, |options| tiles::read(path, tiles, options)),
+    }
+}
+
+/// Reads the rasters of a file.
+pub(super) fn gather_file(path: &Path, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    with_source(path, |source| match source.kind(options)? {
+        Kind::Header => {
+            let data = bil::data_beside(path)
+                .ok_or_else(|| source.error("data", "expected a data file beside the header, found none"))?;
+            with_source(&data, |source| gather(source, Kind::Bil, options, parts))
+        }
+        kind => gather(source, kind, options, parts),
+    })
+}
+
+/// The format of a file.
+pub(super) fn kind_of(path: &Path, options: &Options) -> Result<Kind, Error> {
+    with_source(path, |source| source.kind(options))
+}
+
+fn with_source<T>(path: &Path, read: impl FnOnce(&mut Source) -> Result<T, Error>) -> Result<T, Error> {
+    let name = path.display().to_string();
+    let siblings = |extension: &str| sibling(path, extension);
+    let (file, len) = open(path)?;
+    read(&mut Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings })
 }
 
 fn open(path: &Path) -> Result<(File, u64), Error> {
     let error = |e: io::Error| Error::new(path.display().to_string(), "file", format!("expected a readable file, {e}"));
-    let file = File::open(path).map_err(error)?;
-    let metadata = file.metadata().map_err(error)?;
-    if !metadata.is_file() {
+    // A pipe would wait for its writer to be opened.
+    if !std::fs::metadata(path).map_err(error)?.is_file() {
         return Err(error(io::Error::other("found neither a file nor a directory")));
     }
-    Ok((file, metadata.len()))
+    let file = File::open(path).map_err(error)?;
+    let len = file.metadata().map_err(error)?.len();
+    Ok((file, len))
 }
 
 /// The most bytes read from a file beside the data: headers and projections are short texts.
@@ -178,7 +246,8 @@ impl Source<'_> {
 
     /// The text of the file beside this one that has the given extension.
     pub fn sibling_text(&self, extension: &str) -> Option<String> {
-        (self.siblings)(extension).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+        let text = |bytes: Vec<u8>| String::from_utf8_lossy(text::without_mark(&bytes)).into_owned();
+        (self.siblings)(extension).map(text)
     }
 
     /// The number of samples of a size, if it is allowed.
@@ -240,6 +309,7 @@ pub(super) enum Kind {
     WebP,
     Zip,
     Gzip,
+    Tar,
     Asc,
     UsgsDem,
     /// The header of a `Bil`.
@@ -247,58 +317,72 @@ pub(super) enum Kind {
     Bil,
     Hgt,
     Raw,
-    /// A picture format that holds no heights.
-    Picture(&'static str),
+    /// A format that is recognised but not read.
+    Known(&'static Known),
     Unknown,
 }
 
 impl Kind {
     /// Tells the format from a file's first bytes, its length, and whether a header lies beside it.
     pub fn of(head: &[u8], len: u64, has_header: bool) -> Self {
+        let text = text::without_mark(head);
         match head {
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Kind::Tiff,
             [0x89, b'P', b'N', b'G', ..] => Kind::Png,
             [b'P', b'K', 3, 4, ..] => Kind::Zip,
             [0x1f, 0x8b, 8, ..] => Kind::Gzip,
-            [0xff, 0xd8, 0xff, ..] => Kind::Picture("JPEG"),
             [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Kind::WebP,
-            _ if bil::is_header(head) => Kind::Header,
-            _ if asc::is_header(head) => Kind::Asc,
+            _ if head.get(257..262) == Some(b"ustar") => Kind::Tar,
+            _ if bil::is_header(text) => Kind::Header,
+            _ if asc::is_header(text) => Kind::Asc,
             _ if usgs_dem::is_header(head) => Kind::UsgsDem,
-            _ if has_header => Kind::Bil,
-            _ if hgt::side(len).is_some() => Kind::Hgt,
-            _ => Kind::Unknown,
+            _ if has_header => Known::certain(head).map_or(Kind::Bil, Kind::Known),
+            _ if hgt::size(len).is_some() => Kind::Hgt,
+            _ => Known::of(head, len).map_or(Kind::Unknown, Kind::Known),
         }
+    }
+
+    /// Returns true if a file of this format in a folder is read for its heights.
+    pub fn holds_heights(self) -> bool {
+        !matches!(self, Kind::Header | Kind::Known(_) | Kind::Unknown)
     }
 }
 
-/// Reads a source of a known format, and the files beside it.
+/// Reads the rasters of a source of a known format: one, or those of an archive.
+pub(super) fn gather(source: &mut Source, kind: Kind, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+    match kind {
+        Kind::Zip => archive::gather_zip(source, options, parts),
+        Kind::Gzip => archive::gather_gzip(source, options, parts),
+        Kind::Tar => archive::gather_tar(source, options, parts),
+        kind => parts.add(source.name, options, |options| read(source, kind, options)),
+    }
+}
+
+/// Reads a source of a format that is one raster, and the files beside it.
 pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
     let mut raster = decode(source, kind, options)?;
-    // The member of an archive has been settled by the files beside it.
-    if !matches!(kind, Kind::Zip | Kind::Gzip) {
-        sidecar::settle(source, options, &mut raster);
-    }
+    sidecar::settle(source, options, &mut raster);
     Ok(raster)
 }
 
 fn decode(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
-    if !matches!(kind, Kind::Tiff | Kind::Zip | Kind::Gzip) {
+    if kind != Kind::Tiff {
         one_band(source.name, options)?;
     }
     match kind {
         Kind::Tiff => geotiff::read(source, options),
         Kind::Png => png::read(source, options),
         Kind::WebP => terrain_rgb::read(source, "WebP", options),
-        Kind::Zip => archive::read_zip(source, options),
-        Kind::Gzip => archive::read_gzip(source, options),
+        Kind::Zip | Kind::Gzip | Kind::Tar => {
+            Err(source.error("content", "expected a height file, found an archive within an archive"))
+        }
         Kind::Asc => asc::read(source, options),
         Kind::UsgsDem => usgs_dem::read(source, options),
         Kind::Header => Err(source.error("data", "expected a data file beside the header, found none")),
         Kind::Bil => bil::read(source, options),
         Kind::Hgt => hgt::read(source, options),
         Kind::Raw => raw::read(source, options),
-        Kind::Picture(format) => Err(source.error("content", format!("expected heights, found a {format} picture"))),
+        Kind::Known(known) => Err(source.error("content", known.what())),
         Kind::Unknown => Err(source.error("content", raw::hint(source.len))),
     }
 }

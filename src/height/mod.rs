@@ -11,15 +11,18 @@ mod crs;
 mod cuts;
 pub mod demo;
 mod envi;
+mod folder;
 mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
 pub(crate) mod kept;
+mod known_formats;
 pub mod level_errors;
 pub mod levels;
 mod load;
 mod metadata;
+mod mosaic;
 mod nodata;
 mod png;
 pub mod progress;
@@ -40,6 +43,7 @@ mod tiff_directory;
 mod tiff_layout;
 mod tiff_mask;
 mod tiff_sample;
+mod tile_grid;
 mod tiles;
 mod units;
 mod unplaced;
@@ -48,7 +52,9 @@ mod wkt;
 mod world_file;
 
 pub use georef::metres_per_degree;
-pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
+pub use load::{
+    Encoding, HoleFill, Loaded, Options, RawLayout, SourceFile, load, load_all, load_bytes, load_bytes_with,
+};
 pub use nodata::number;
 pub use raster::MAX_SIDE;
 pub use sample::{Order, SampleType};

@@ -86,7 +86,15 @@ impl Raster {
             field = field.without_holes();
         }
         let Self { format, sample_type, warnings, .. } = self;
-        Ok(Loaded { field, format, sample_type, exact_in_16_bit, warnings })
+        Ok(Loaded { field, format, sample_type, exact_in_16_bit, warnings, sources: Vec::new() })
+    }
+
+    /// The same values with rows from north to south, columns from west to east, and holes in place of its nodata value.
+    pub fn settled(mut self, name: &str, options: &Options) -> Result<Self, Error> {
+        self.rearrange(name, &Options { crop: None, ..options.clone() })?;
+        self.make_holes(options);
+        (self.nodata, self.turn) = (None, Turn::default());
+        Ok(self)
     }
 
     /// Crops, and turns the rows to run from north to south and the columns from west to east.

@@ -105,7 +105,8 @@ fn decode(name: &str, reader: impl load::Input, options: &Options) -> Result<Rgb
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|e| error(&e))?;
     let (w, h) = decoder.dimensions();
-    load::samples(name, [w, h].map(u64::from), options)?;
+    // Servers send a picture of one pixel where there is nothing.
+    load::samples(name, [w, h].map(|n| u64::from(n.max(2))), options)?;
     match decoder.color_type() {
         ColorType::Rgb8 | ColorType::Rgba8 | ColorType::L8 | ColorType::La8 => (),
         other => return Err(error(&format!("expected 8 bits a channel, found {other:?}"))),

@@ -9,58 +9,67 @@ use std::{
 
 use super::{
     Error, Holes, Samples,
-    georef::{MERCATOR_HALF, Place, Unit},
     load::{self, Options},
     raster::Raster,
     terrain_rgb::{self, Encoding},
+    tile_grid::TileGrid,
 };
 
-/// Files of one zoom level by (x, y).
+/// Files of one zoom level by column from the west and row from the north.
 type Level = BTreeMap<[u32; 2], PathBuf>;
+
+/// A directory of tiles.
+pub(super) struct Tiles {
+    grid: TileGrid,
+    /// By zoom level and by whether the tiles have twice the pixels, `@2x`.
+    levels: BTreeMap<(u32, bool), Level>,
+}
 
 /// The deepest zoom level: 2^30 tiles a side, so that sample positions fit.
 const MAX_ZOOM: u32 = 30;
 /// The most bytes of one tile.
 const TILE_BYTES: u64 = 1 << 26;
 
-/// Reads the bounding rectangle of the tiles at one zoom level; absent tiles are holes.
-pub(super) fn read(path: &Path, options: &Options) -> Result<Raster, Error> {
+/// Reads the bounding rectangle of the tiles at one zoom level; absent and empty tiles are holes.
+pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Raster, Error> {
     let name = path.display().to_string();
     load::one_band(&name, options)?;
-    let (zoom, level) = choose(scan(path)?, &name, options)?;
-    let encoding = encoding(path, &name, options)?;
+    let Tiles { grid, levels } = tiles;
+    let (zoom, level) = choose(levels, &name, options)?;
+    let encoding = encoding(path, &name, &grid, options)?;
     let [west, north, east, south] = bounds(&level);
     let (across, down) = (east - west + 1, south - north + 1);
 
     let mut target: Option<Mosaic> = None;
+    let mut empty = 0;
     for (&[x, y], file) in &level {
         let tile_name = file.display().to_string();
-        let picture = terrain_rgb::decode_bytes(&tile_name, &bytes(file, &tile_name)?, options)?;
-        let side = picture.width();
-        let mosaic = match &mut target {
-            Some(mosaic) => mosaic,
-            None => {
-                let size = [across, down].map(|n| u64::from(n) * u64::from(side));
-                let count = load::samples(&name, size, options)?;
-                target.insert(Mosaic {
-                    side,
-                    size: size.map(|n| n as u32),
-                    heights: vec![0.0; count],
-                    known: Holes::none(count),
-                })
-            }
-        };
-        if [picture.width(), picture.height()] != [mosaic.side; 2] {
-            let what =
-                format!("expected {0}x{0} pixels, found {1}x{2}", mosaic.side, picture.width(), picture.height());
+        let content = bytes(file, &tile_name)?;
+        if content.is_empty() {
+            empty += 1;
+            continue;
+        }
+        let picture = terrain_rgb::decode_bytes(&tile_name, &content, options)?;
+        // Servers answer with a transparent picture of any size where there is nothing.
+        if picture.pixels().all(|pixel| pixel.0[3] == 0) {
+            continue;
+        }
+        let side = target.as_ref().map_or(picture.width(), |mosaic| mosaic.side);
+        if picture.dimensions() != (side, side) {
+            let what = format!("expected {side}x{side} pixels, found {}x{}", picture.width(), picture.height());
             return Err(Error::new(tile_name, "size", what));
         }
+        let mosaic = match &mut target {
+            Some(mosaic) => mosaic,
+            None => target.insert(Mosaic::new(&name, [across, down], side, options)?),
+        };
         mosaic.store(encoding, picture.as_raw(), [x - west, y - north]);
     }
-    let Some(mosaic) = target else { return Err(no_tiles(&name)) };
+    let Some(mosaic) = target else {
+        return Err(Error::new(name, "directory", format!("expected tiles with data at zoom {zoom}, found none")));
+    };
 
-    let step = 2.0 * MERCATOR_HALF / (f64::from(mosaic.side) * f64::from(1u32 << zoom));
-    let centre = |tile: u32| (f64::from(tile) * f64::from(mosaic.side) + 0.5) * step - MERCATOR_HALF;
+    let place = grid.place(&name, zoom, mosaic.side, [west, north])?;
     let format = match encoding {
         Encoding::Terrarium => "Terrarium tiles",
         Encoding::Mapbox => "Terrain-RGB tiles",
@@ -69,15 +78,11 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Raster, Error> {
     let mut raster = Raster::new(format, encoding.name(), mosaic.size, Samples::F32(mosaic.heights));
     raster.holes = holes;
     raster.step = encoding.step();
-    raster.place = Some(Place {
-        origin: [centre(west), -centre(north)],
-        step: [step; 2],
-        unit: Unit::Mercator,
-        crs: Some("EPSG:3857".to_owned()),
-    });
-    let absent = u64::from(across) * u64::from(down) - level.len() as u64;
-    if absent > 0 {
-        raster.warnings.push(format!("{absent} of {} tiles at zoom {zoom} are absent and become holes", across * down));
+    raster.place = Some(place);
+    let all = u64::from(across) * u64::from(down);
+    let absent = all - level.len() as u64;
+    for (count, what) in [(absent, "absent"), (empty, "empty")].into_iter().filter(|(count, _)| *count > 0) {
+        raster.warnings.push(format!("{count} of {all} tiles at zoom {zoom} are {what} and become holes"));
     }
     Ok(raster)
 }
@@ -86,24 +91,33 @@ fn no_tiles(name: &str) -> Error {
     Error::new(name, "directory", "expected tiles named zoom/x/y.png, found none")
 }
 
-/// All tiles by zoom level.
-fn scan(path: &Path) -> Result<BTreeMap<u32, Level>, Error> {
-    let mut levels: BTreeMap<u32, Level> = BTreeMap::new();
-    for (zoom, zoom_path) in numbered(path)?.into_iter().filter(|(zoom, path)| *zoom <= MAX_ZOOM && path.is_dir()) {
-        for (x, x_path) in numbered(&zoom_path)?.into_iter().filter(|(x, path)| *x < 1 << zoom && path.is_dir()) {
-            for (y, file) in numbered(&x_path)?.into_iter().filter(|(y, path)| *y < 1 << zoom && is_picture(path)) {
-                levels.entry(zoom).or_default().insert([x, y], file);
+/// All tiles of a directory, none where it is another kind of folder.
+pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
+    let mut levels: BTreeMap<(u32, bool), Level> = BTreeMap::new();
+    let grid = TileGrid::read(path)?;
+    for (zoom, _, zoom_path) in numbered(path)?.into_iter().filter(|(zoom, _, path)| *zoom <= MAX_ZOOM && path.is_dir())
+    {
+        for (x, _, x_path) in numbered(&zoom_path)?.into_iter().filter(|(.., path)| path.is_dir()) {
+            for (y, double, file) in numbered(&x_path)?.into_iter().filter(|(.., path)| is_picture(path)) {
+                if let Some(tile) = grid.tile_at(zoom, [x, y]) {
+                    levels.entry((zoom, double)).or_default().insert(tile, file);
+                }
             }
         }
     }
-    Ok(levels)
+    Ok((!levels.is_empty()).then_some(Tiles { grid, levels }))
 }
 
-/// What lies in a directory under names that are numbers.
-fn numbered(path: &Path) -> Result<Vec<(u32, PathBuf)>, Error> {
+/// Entries of a directory with numbers as names; the flag is true if `@2x` follows the number.
+fn numbered(path: &Path) -> Result<Vec<(u32, bool, PathBuf)>, Error> {
     let entries = fs::read_dir(path).map_err(|e| Error::new(path.display().to_string(), "directory", e))?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    Ok(paths.filter_map(|path| Some((path.file_stem()?.to_str()?.parse().ok()?, path))).collect())
+    let number = |path: PathBuf| {
+        let stem = path.file_stem()?.to_str()?;
+        let double = stem.strip_suffix("@2x");
+        Some((double.unwrap_or(stem).parse().ok()?, double.is_some(), path))
+    };
+    Ok(paths.filter_map(number).collect())
 }
 
 fn is_picture(path: &Path) -> bool {
@@ -111,16 +125,24 @@ fn is_picture(path: &Path) -> bool {
     ["png", "webp", "pngraw"].iter().any(|e| extension.eq_ignore_ascii_case(e))
 }
 
-/// The zoom level asked for, else the highest whose tiles fill their rectangle, else the highest.
-fn choose(mut levels: BTreeMap<u32, Level>, name: &str, options: &Options) -> Result<(u32, Level), Error> {
+/// The zoom level asked for, else the highest whose tiles fill their rectangle, else the highest; of both densities the
+/// one with more tiles, else the finer.
+fn choose(levels: BTreeMap<(u32, bool), Level>, name: &str, options: &Options) -> Result<(u32, Level), Error> {
+    let mut fullest: BTreeMap<u32, Level> = BTreeMap::new();
+    for ((zoom, _), level) in levels {
+        let other = fullest.entry(zoom).or_default();
+        if level.len() >= other.len() {
+            *other = level;
+        }
+    }
     let complete = |level: &Level| {
         let [west, north, east, south] = bounds(level);
         u64::from(east - west + 1) * u64::from(south - north + 1) == level.len() as u64
     };
-    let best = levels.iter().rev().find(|(_, level)| complete(level)).or(levels.iter().next_back());
+    let best = fullest.iter().rev().find(|(_, level)| complete(level)).or(fullest.iter().next_back());
     let zoom = options.zoom.or(best.map(|(&zoom, _)| zoom)).ok_or_else(|| no_tiles(name))?;
-    let found: Vec<String> = levels.keys().map(u32::to_string).collect();
-    match levels.remove(&zoom) {
+    let found: Vec<String> = fullest.keys().map(u32::to_string).collect();
+    match fullest.remove(&zoom) {
         Some(level) => Ok((zoom, level)),
         None => Err(Error::new(name, "--zoom", format!("expected one of {}, found {zoom}", found.join(", ")))),
     }
@@ -132,17 +154,21 @@ fn bounds(level: &Level) -> [u32; 4] {
 }
 
 /// The encoding asked for, else the one that the directory's name or a description in it names.
-fn encoding(path: &Path, name: &str, options: &Options) -> Result<Encoding, Error> {
+fn encoding(path: &Path, name: &str, grid: &TileGrid, options: &Options) -> Result<Encoding, Error> {
     let absolute = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let descriptions =
         ["tilejson.json", "tiles.json", "tile.json", "metadata.json", "README.md", "README.txt", "README"];
     let texts = descriptions.iter().filter_map(|file| bytes(&path.join(file), name).ok());
     let texts = texts.map(|bytes| String::from_utf8_lossy(&bytes).to_lowercase());
     let own_name = absolute.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-    options.encoding.or_else(|| std::iter::once(own_name).chain(texts).find_map(|text| named(&text))).ok_or_else(|| {
-        let what = "neither name nor description tells what the colours mean: give --encoding terrarium|mapbox";
-        Error::new(name, "directory", what)
-    })
+    options
+        .encoding
+        .or(grid.encoding)
+        .or_else(|| std::iter::once(own_name).chain(texts).find_map(|text| named(&text)))
+        .ok_or_else(|| {
+            let what = "neither name nor description tells what the colours mean: give --encoding terrarium|mapbox";
+            Error::new(name, "directory", what)
+        })
 }
 
 /// The encoding a text names, if only one.
@@ -155,7 +181,8 @@ fn named(text: &str) -> Option<Encoding> {
     }
 }
 
-fn bytes(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
+/// The bytes of a small file.
+pub(super) fn bytes(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let read = File::open(path).and_then(|file| file.take(TILE_BYTES).read_to_end(&mut bytes));
     read.map_err(|e| Error::new(name, "file", e))?;
@@ -173,6 +200,12 @@ struct Mosaic {
 }
 
 impl Mosaic {
+    fn new(name: &str, tiles: [u32; 2], side: u32, options: &Options) -> Result<Self, Error> {
+        let size = tiles.map(|n| u64::from(n) * u64::from(side));
+        let count = load::samples(name, size, options)?;
+        Ok(Self { side, size: size.map(|n| n as u32), heights: vec![0.0; count], known: Holes::none(count) })
+    }
+
     fn store(&mut self, encoding: Encoding, pixels: &[u8], [x, y]: [u32; 2]) {
         let (side, width) = (self.side as usize, self.size[0] as usize);
         for (j, row) in pixels.chunks_exact(side * 4).enumerate() {

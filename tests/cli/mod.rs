@@ -3,6 +3,7 @@
 mod endless;
 mod numbers;
 mod robust;
+mod several;
 mod watchdog;
 #[cfg(feature = "vulkan")]
 mod with_a_device;

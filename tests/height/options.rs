@@ -31,6 +31,12 @@ fn nodata_becomes_holes() {
     let loaded = load(&float, with(f64::from(f32::MIN)), &Options::default());
     assert_eq!((loaded.field.holes().count(), loaded.exact_in_16_bit), (2, true));
 
+    for infinity in [f64::INFINITY, f64::NEG_INFINITY] {
+        let float = TiffFile::new(SIZE, 32, 3).tag(NODATA, Tag::Text(infinity.to_string()));
+        let loaded = load(&float, with(infinity), &Options::default());
+        assert_eq!((loaded.field.holes().count(), loaded.warnings.len()), (2, 0), "{infinity}");
+    }
+
     let options = Options { nodata: Some(23.0), ..Options::default() };
     let loaded = load(&short, tiny::height, &options);
     assert_eq!(loaded.field.holes().count(), 1);

@@ -60,6 +60,17 @@ pub fn zip(members: &[(&str, &[u8])]) -> Vec<u8> {
     writer.finish().unwrap().into_inner()
 }
 
+pub fn tar(members: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut builder = tar::Builder::new(Vec::new());
+    for (name, bytes) in members {
+        let mut header = tar::Header::new_ustar();
+        header.set_size(bytes.len() as u64);
+        header.set_mode(0o644);
+        builder.append_data(&mut header, name, *bytes).unwrap();
+    }
+    builder.into_inner().unwrap()
+}
+
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(bytes).unwrap();
@@ -122,6 +133,7 @@ pub fn all() -> Vec<Tiny> {
         Tiny::new("grid.asc", asc().into_bytes()),
         Tiny::new("grid.asc.gz", gzip(asc().as_bytes())),
         Tiny::new("grid.zip", zip(&[("grid.asc", asc().as_bytes())])),
+        Tiny::new("grid.tar.gz", gzip(&tar(&[("grid.asc", asc().as_bytes())]))),
         Tiny::new("quad.dem", dem),
         Tiny::new("bare.raw", u16s(u16::to_be_bytes)),
         Tiny::new("esri.bil", u16s(u16::to_le_bytes)),

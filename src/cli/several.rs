@@ -1,0 +1,25 @@
+//! Several files and folders named as one terrain.
+
+use anyhow::{Result, bail};
+
+use super::{endless, scene};
+
+/// The one name, if it is one; several are files and folders.
+pub fn only(terrain: &[String]) -> Result<Option<&str>> {
+    if let [only] = terrain {
+        return Ok(Some(only));
+    }
+    match terrain.iter().find(|name| scene::is_demo(name) || endless::is_named(name)) {
+        Some(name) => bail!("{name}: expected files and folders where several terrains are one field"),
+        None => Ok(None),
+    }
+}
+
+/// The path beside which a cache of the field lies: that of its file, or of the first one with the count of the rest.
+pub fn cache_path(terrain: &[String]) -> String {
+    match terrain {
+        [only] => only.clone(),
+        [first, rest @ ..] => format!("{first}+{}", rest.len()),
+        [] => String::new(),
+    }
+}
