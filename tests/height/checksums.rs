@@ -107,14 +107,17 @@ fn files() -> Vec<File> {
 #[test]
 fn no_flip_of_a_thousand_changes_a_height() {
     let mut random = Rng::with_seed(19);
+    let mut wrong = Vec::new();
     for file in files() {
         let flips = (0..FLIPS).map(|_| (random.usize(file.covered.clone()), 1u8 << random.u8(..8)));
         let [refused, same, different] = file.flipped(flips);
         println!("{}: {refused} refused, {same} the same, {different} different", file.name);
-        assert_eq!(different, 0, "{}: of {FLIPS} flips {refused} are refused, {same} change nothing", file.name);
         // Names and dates in archives may change; so may bits that nothing depends on.
-        assert!(refused * 10 > FLIPS * 9, "{}: {refused} refused, {same} the same", file.name);
+        if different > 0 || refused * 10 < FLIPS * 9 {
+            wrong.push((file.name, refused, same, different));
+        }
     }
+    assert!(wrong.is_empty(), "refused, the same, different: {wrong:?}");
 }
 
 /// As 63 of 120 once were read.
