@@ -16,7 +16,7 @@ const FOLDER: &str = "cuesta-stress";
 /// Arguments.
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// Only this family: data, position, view, time, arithmetic, stiff or file; may be repeated.
+    /// Only this family: data, position, view, time, arithmetic, stiff, file or sweep; may be repeated.
     #[arg(long, value_name = "F")]
     pub family: Vec<String>,
     /// Only cases with this in their name; may be repeated.

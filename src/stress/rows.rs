@@ -14,7 +14,7 @@ pub const FILE: &str = "stress.json";
 /// One check of one case with one technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// `data`, `position`, `view`, `time`, `arithmetic`, `stiff` or `file`.
+    /// `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: String,
     /// The case.
     pub name: String,

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cuesta::cli::whole::Whole;
-use cuesta::draw::DrawList;
+use cuesta::draw::{DrawList, Geometry, Limits, Manner};
 use cuesta::height::{self, Field, Options, synth};
-use cuesta::lod::{self, Settings};
+use cuesta::lod::{self, Entry, Settings, Technique, geomipmap};
 use cuesta::stress::laws::{LAWS, Subject};
-use cuesta::stress::sweep::{self, SweepCase, random};
+use cuesta::stress::sweep::{self, SweepCase, random, shrink};
 use cuesta::stress::views;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
@@ -116,4 +116,46 @@ fn a_flat_field_of_any_size_takes_few_triangles() {
         println!("{size:?}: {} triangles", list.triangles());
         assert!(list.triangles() <= most, "{size:?}: {} triangles", list.triangles());
     }
+}
+
+/// GeoMipMapping without its last block.
+struct BlockLost(Box<dyn Technique>);
+
+impl Technique for BlockLost {
+    fn resident(&self) -> &Geometry {
+        self.0.resident()
+    }
+    fn limits(&self) -> Limits {
+        self.0.limits()
+    }
+    fn select(&mut self, view: &View, list: &mut DrawList) {
+        self.0.select(view, list);
+        if let Some(draw) = list.draws.last_mut() {
+            draw.instances.end -= 1;
+        }
+    }
+    fn keeps_tolerance(&self) -> bool {
+        true
+    }
+    fn manner(&self) -> Manner {
+        self.0.manner()
+    }
+}
+
+static BLOCK_LOST: Entry = Entry {
+    name: "block-lost",
+    build: |field, settings| Box::new(BlockLost((geomipmap::ENTRY.build)(field, settings))),
+    ..geomipmap::ENTRY
+};
+
+#[test]
+fn what_is_broken_is_found_and_made_small() {
+    let case = |number| random::case(SEED, number, &BLOCK_LOST, None);
+    let failures: Vec<_> = (0..20).filter_map(|number| case(number).check_with(&BLOCK_LOST).err()).collect();
+    assert!(failures.len() > 5, "{} of 20 cases fail", failures.len());
+    let shrunk = shrink::shrink(failures[0].clone(), |case| case.check_with(&BLOCK_LOST));
+    let SweepCase { terrain, settings, .. } = &shrunk.case;
+    assert_eq!((terrain.kind.as_str(), terrain.size), ("flat", [2, 2]), "{shrunk}");
+    assert!(settings.is_empty() && shrunk.law == "one surface", "{shrunk}");
+    assert_eq!(shrunk.case.to_string().parse(), Ok(shrunk.case.clone()), "it is read as it was printed");
 }

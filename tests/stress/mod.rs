@@ -120,7 +120,7 @@ fn only_world_coordinates_tremble_far_from_the_origin() {
 fn every_family_of_the_contract_is_there_and_every_name_once() {
     let mut families: Vec<_> = cases().map(|case| case.family).collect();
     families.dedup();
-    assert_eq!(families, ["data", "position", "view", "time", "arithmetic", "stiff", "file"]);
+    assert_eq!(families, ["data", "position", "view", "time", "arithmetic", "stiff", "file", "sweep"]);
     let mut names: Vec<_> = cases().map(|case| (case.family, case.name)).collect();
     let count = names.len();
     names.sort_unstable();

@@ -2,9 +2,7 @@
 //!
 //! They are the same at every tolerance, so that a wider one never draws more. A wedge larger than a block is drawn if
 //! it covers any block in sight. Where vertices collapse onto the field's edge, a wedge covers other blocks than its halves
-//! do. All of these lie in one square ([`Lattice::edge_side`]), whose blocks are culled together.
-
-use std::collections::BTreeMap;
+//! do. All of these lie in one square ([`Lattice::edge_side`]), which is culled and drawn as one block.
 
 use rayon::prelude::*;
 
@@ -13,7 +11,17 @@ use crate::height::Field;
 use crate::height::surface::has_land;
 use crate::view::{Aabb, Containment, View};
 
+/// What is culled and drawn as one: a block, or a square that the field's edge crosses.
+#[derive(Clone, Copy)]
+struct Square {
+    /// Its first block.
+    first: usize,
+    /// Cells along its side.
+    side: i32,
+}
+
 /// The blocks of a field.
+#[derive(Default)]
 pub struct Blocks {
     /// Side of a block, cells: a power of two, at most the root square's.
     pub side: i32,
@@ -23,8 +31,8 @@ pub struct Blocks {
     bounds: Vec<Option<Aabb>>,
     /// By block: whether it may be in sight.
     seen: Vec<bool>,
-    /// By square that the field's edge crosses: its blocks.
-    edge_squares: Vec<Vec<usize>>,
+    /// By block: the square that it is culled and drawn with.
+    squares: Vec<Square>,
 }
 
 impl Blocks {
@@ -32,40 +40,51 @@ impl Blocks {
     pub fn new(field: &Field, lattice: &Lattice) -> Self {
         if field.land().is_some() {
             // Wedges tell themselves whether they are in sight.
-            return Self {
-                side: lattice.side(),
-                count: [0; 2],
-                bounds: Vec::new(),
-                seen: Vec::new(),
-                edge_squares: Vec::new(),
-            };
+            return Self { side: lattice.side(), ..Self::default() };
         }
         let side = lattice.block_side();
         let last = field.size().map(|n| n as i32 - 1);
         let count = last.map(|n| (n - 1) / side + 1);
         let of_block = |k: i32| bounds(field, last, side, [k % count[0], k / count[0]]);
         let bounds: Vec<_> = (0..count[0] * count[1]).into_par_iter().map(of_block).collect();
-        let edge_squares = edge_squares(count, last, side, lattice.edge_side());
-        Self { side, count, seen: vec![false; bounds.len()], bounds, edge_squares }
+        let squares = squares(count, last, side, lattice.edge_side());
+        Self { side, count, seen: vec![false; bounds.len()], bounds, squares }
     }
 
     /// Finds the blocks in sight.
     pub fn look(&mut self, view: &View) {
         let frustum = view.frustum();
-        for (seen, bounds) in self.seen.iter_mut().zip(&self.bounds) {
-            *seen = bounds.as_ref().is_some_and(|bounds| frustum.contains(bounds) != Containment::Outside);
-        }
-        for blocks in &self.edge_squares {
-            let is_seen = blocks.iter().any(|&block| self.seen[block]);
-            blocks.iter().for_each(|&block| self.seen[block] = is_seen);
+        self.seen.fill(false);
+        for (bounds, square) in self.bounds.iter().zip(&self.squares) {
+            self.seen[square.first] |=
+                bounds.as_ref().is_some_and(|bounds| frustum.contains(bounds) != Containment::Outside);
         }
     }
 
-    /// The number of the block in sight around a wedge that lies in one.
+    /// The block that a block is culled and drawn with.
+    pub fn drawn_with(&self, block: usize) -> usize {
+        self.squares[block].first
+    }
+
+    /// Whether a wedge lies in one block, or in a square that is drawn as one; also if it lies beyond the field.
+    pub fn hold(&self, corners: [Place; 3]) -> bool {
+        let length = |k: usize| {
+            let along = corners.map(|at| at[k]);
+            along.into_iter().max().unwrap_or(0) - along.into_iter().min().unwrap_or(0)
+        };
+        let side = self.around(corners).map_or(i32::MAX, |block| self.squares[block].side);
+        length(0).max(length(1)) <= side
+    }
+
+    /// The number of the block in sight with which a wedge within one is drawn.
     pub fn seen(&self, corners: [Place; 3]) -> Option<usize> {
+        self.around(corners).map(|block| self.drawn_with(block)).filter(|&block| self.seen[block])
+    }
+
+    /// The block around the north-western corner of a wedge's box.
+    fn around(&self, corners: [Place; 3]) -> Option<usize> {
         let [i, j] = [0, 1].map(|k| corners.iter().map(|at| at[k]).min().unwrap_or(0) / self.side);
-        let block = (j * self.count[0] + i) as usize;
-        (i < self.count[0] && j < self.count[1] && self.seen[block]).then_some(block)
+        (i < self.count[0] && j < self.count[1]).then_some((j * self.count[0] + i) as usize)
     }
 
     /// Whether a block may be in sight.
@@ -85,16 +104,17 @@ impl Blocks {
     }
 }
 
-/// The blocks of each square of this side that reaches beyond the last sample.
-fn edge_squares(count: [i32; 2], last: Place, side: i32, edge_side: i32) -> Vec<Vec<usize>> {
-    let mut squares = BTreeMap::<Place, Vec<usize>>::new();
-    for block in 0..count[0] * count[1] {
-        let square = [block % count[0], block / count[0]].map(|n| n * side / edge_side);
-        if (0..2).any(|axis| (square[axis] + 1) * edge_side > last[axis]) {
-            squares.entry(square).or_default().push(block as usize);
+/// By block: its square. Only squares that reach beyond the last sample are larger than a block.
+fn squares(count: [i32; 2], last: Place, side: i32, edge_side: i32) -> Vec<Square> {
+    let of_block = |block: i32| {
+        let at = [block % count[0], block / count[0]];
+        let first = at.map(|n| n * side / edge_side * edge_side);
+        if (0..2).any(|k| first[k] + edge_side > last[k]) {
+            return Square { first: (first[1] / side * count[0] + first[0] / side) as usize, side: edge_side };
         }
-    }
-    squares.into_values().collect()
+        Square { first: block as usize, side }
+    };
+    (0..count[0] * count[1]).map(of_block).collect()
 }
 
 fn bounds(field: &Field, last: Place, side: i32, at: Place) -> Option<Aabb> {

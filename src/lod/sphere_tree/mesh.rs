@@ -149,26 +149,19 @@ impl Mesh<'_> {
 
     /// Sorts wedges in sight into those larger than a block and those within one.
     fn descend(&self, wedge: &Wedge, large: &mut Vec<Wedge>, small: &mut Vec<(usize, Wedge)>) {
-        if self.is_within_a_block(&wedge.map(|corner| corner.at)) {
-            small.extend(self.blocks.seen(wedge.map(|corner| corner.at)).map(|block| (block, *wedge)));
+        let corners = wedge.map(|corner| corner.at);
+        if self.blocks.hold(corners) {
+            small.extend(self.blocks.seen(corners).map(|block| (block, *wedge)));
         } else if let Some(halves) = self.halves(wedge) {
             halves.iter().for_each(|half| self.descend(half, large, small));
-        } else if self.has_area(wedge) && self.covers_a_seen_block(wedge.map(|corner| corner.at)) {
+        } else if self.covers_a_seen_block(corners) {
             large.push(*wedge);
         }
     }
 
-    /// Whether a wedge is half a block or smaller.
-    fn is_within_a_block(&self, [apex, left, right]: &[Place; 3]) -> bool {
-        let length = |k: usize| [apex, left, right].map(|at| at[k]).into_iter();
-        (0..2).all(|k| length(k).max().unwrap_or(0) - length(k).min().unwrap_or(0) <= self.blocks.side)
-    }
-
-    /// A wedge that sticks out is drawn in a square whose blocks are seen together.
     fn covers_a_seen_block(&self, wedge: [Place; 3]) -> bool {
-        let drawn = wedge.map(|at| self.measured.lattice.on_field(at));
-        if self.is_within_a_block(&wedge) || drawn != wedge {
-            return self.blocks.seen(drawn).is_some();
+        if self.blocks.hold(wedge) {
+            return self.blocks.seen(wedge).is_some();
         }
         let [apex, left, right] = wedge;
         let middle = [0, 1].map(|k| (left[k] + right[k]) / 2);
@@ -187,9 +180,10 @@ impl Mesh<'_> {
                 }
             }
         }
-        let row = self.blocks.side as usize + 1;
-        let mut table = vec![u32::MAX; row * row];
-        let origin = [0, 1].map(|k| leaves.iter().flatten().map(|corner| corner.at[k]).min().unwrap_or(0));
+        let along = |k: usize| leaves.iter().flatten().map(move |corner| corner.at[k]);
+        let origin = [0, 1].map(|k| along(k).min().unwrap_or(0));
+        let [row, rows] = [0, 1].map(|k| (along(k).max().unwrap_or(0) - origin[k] + 1) as usize);
+        let mut table = vec![u32::MAX; row * rows];
         let mut piece = Piece::default();
         for wedge in leaves.iter().filter(|wedge| self.has_area(wedge)) {
             for corner in wedge {

@@ -104,7 +104,7 @@ impl Patches {
             let [i, j] = [0, 1].map(|k| (middle[k] - 1).div_euclid(blocks.side)..=middle[k] / blocks.side);
             for (i, j) in j.flat_map(|j| i.clone().map(move |i| (i, j))) {
                 if (0..blocks.count[0]).contains(&i) && (0..blocks.count[1]).contains(&j) {
-                    let block = (j * blocks.count[0] + i) as usize;
+                    let block = blocks.drawn_with((j * blocks.count[0] + i) as usize);
                     self.of_blocks[block].iter_mut().for_each(|patch| patch.is_stale = true);
                 }
             }

@@ -54,20 +54,34 @@ impl SweepCase {
 
     /// Holds the case against every invariant. Returns the first that fails; a panic is a failure.
     pub fn check(&self) -> Result<(), Failure> {
-        let (field, view) = self.scene();
-        let views = [("the case's view", view)];
-        let fail = |law, broken| Failure { case: self.clone(), law, broken };
-        match catch_unwind(AssertUnwindSafe(|| self.keeps_laws(&field, &views))) {
-            Ok(outcome) => outcome.map_err(|(law, broken)| fail(law, broken)),
-            Err(panic) => Err(fail("no panic", Broken::new(views[0], panic_text(&*panic)))),
+        match self.entry() {
+            Ok(entry) => self.check_with(entry),
+            Err(why) => Err(self.fails("it can be prepared", Broken::new(("the case's view", self.scene().1), why))),
         }
     }
 
-    fn keeps_laws(&self, field: &Arc<Field>, views: &[(&'static str, View)]) -> Result<(), (&'static str, Broken)> {
-        let prepared = self.entry().and_then(|entry| {
-            let settings = Settings::new(entry, self.variant.as_deref(), &self.settings)?;
-            entry.prepare(field, &settings)
-        });
+    /// The same with another row in place of the technique's.
+    pub fn check_with(&self, entry: &Entry) -> Result<(), Failure> {
+        let (field, view) = self.scene();
+        let views = [("the case's view", view)];
+        match catch_unwind(AssertUnwindSafe(|| self.keeps_laws(entry, &field, &views))) {
+            Ok(outcome) => outcome.map_err(|(law, broken)| self.fails(law, broken)),
+            Err(panic) => Err(self.fails("no panic", Broken::new(views[0], panic_text(&*panic)))),
+        }
+    }
+
+    fn fails(&self, law: &'static str, broken: Broken) -> Failure {
+        Failure { case: self.clone(), law, broken }
+    }
+
+    fn keeps_laws(
+        &self,
+        entry: &Entry,
+        field: &Arc<Field>,
+        views: &[(&'static str, View)],
+    ) -> Result<(), (&'static str, Broken)> {
+        let settings = Settings::new(entry, self.variant.as_deref(), &self.settings);
+        let prepared = settings.and_then(|settings| entry.prepare(field, &settings));
         let mut technique = prepared.map_err(|why| ("it can be prepared", Broken::new(views[0], why)))?;
         let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
         let mut subject =

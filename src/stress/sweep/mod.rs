@@ -48,7 +48,7 @@ impl std::fmt::Display for Failure {
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
     let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).collect();
     let few = failures.len().min(MAX_SHRUNK);
-    failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone()));
+    failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone(), SweepCase::check));
     failures
 }
 
