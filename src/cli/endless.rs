@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow, bail};
 
 use crate::height::bezier::{Bezier, LAYERS};
-use crate::height::{Field, Loaded, Options};
+use crate::height::{Field, Footprint, Loaded, Options};
 
 /// The land called `endless` or `endless:SEED`, unless a file has that name.
 pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
@@ -32,7 +32,8 @@ fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     }
     let field = Field::endless(Arc::new(Bezier::new(seed, LAYERS)));
     let sample_type = "f32".to_string();
-    Ok(Loaded { field, format: "endless", sample_type, exact_in_16_bit: false, warnings: Vec::new() })
+    let (footprint, warnings) = (Footprint::default(), Vec::new());
+    Ok(Loaded { field, format: "endless", sample_type, exact_in_16_bit: false, footprint, warnings })
 }
 
 /// Refuses a land without samples for what looks at every sample.

@@ -108,7 +108,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);
     }
-    plan::run(common, args, terrain, &Arc::new(loaded.field))
+    plan::run(common, args, terrain, loaded)
 }
 
 #[cfg(not(feature = "vulkan"))]

@@ -6,6 +6,7 @@ pub mod endless;
 pub mod export;
 pub mod info;
 pub mod interrupt;
+pub mod overlay;
 pub mod plan;
 #[cfg(feature = "vulkan")]
 pub mod profile;

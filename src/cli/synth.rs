@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::info::Info;
 use super::{Common, Outcome, report};
-use crate::height::Loaded;
 use crate::height::synth::{self, Kind};
+use crate::height::{Footprint, Loaded};
 use crate::height::{Samples, save};
 
 /// Arguments.
@@ -46,7 +46,8 @@ pub fn run(common: &Common, args: &SynthArgs) -> Result<Outcome> {
     save::save(&field, &args.output)?;
     let coded = matches!(field.samples(), Samples::Coded { .. });
     let sample_type = if coded { "u16" } else { "f32" }.to_string();
-    let loaded = Loaded { field, format: "synth", sample_type, exact_in_16_bit: coded, warnings: Vec::new() };
+    let (footprint, warnings) = (Footprint::default(), Vec::new());
+    let loaded = Loaded { field, format: "synth", sample_type, exact_in_16_bit: coded, footprint, warnings };
     report::print(common, &Info::of(&loaded))?;
     Ok(Outcome::Done)
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, interrupt, render, report};
+use crate::height::Loaded;
 use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;
 use crate::viewer::{self, Setup};
@@ -83,8 +84,9 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         bail!("--seconds: expected a number of seconds");
     }
     let target = target(args)?;
-    let field = Arc::new(args.terrain.load(common)?.field);
-    let (look, overlay) = args.look.build(&args.terrain.terrain)?;
+    let Loaded { field, footprint, .. } = args.terrain.load(common)?;
+    let field = Arc::new(field);
+    let (look, overlay) = args.look.build_for_window(common, &args.terrain.terrain, (&field, &footprint))?;
     let summary = viewer::run(&Setup {
         name: args.terrain.terrain.clone(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
@@ -92,7 +94,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         near: args.view.near,
         technique: args.technique.settings()?,
         choices: args.technique.settings.clone(),
-        overlay: overlay.or(args.look.picture(&args.terrain.terrain)?),
+        overlay,
         look,
         choice: render::choice(common),
         validate: common.validate,

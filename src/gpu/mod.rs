@@ -18,6 +18,7 @@ mod live;
 mod loss;
 mod materials;
 pub mod memory;
+mod mipmaps;
 pub mod oracle;
 pub mod pages;
 pub mod pipelines;

@@ -8,8 +8,9 @@ use ash::vk;
 use super::device::Gpu;
 use super::frames::once;
 use super::memory::{Buffer, Image, ImageInfo, barriers};
+use super::mipmaps;
 use crate::height::{Field, Samples};
-use crate::plan::ScenePlan;
+use crate::plan::{ScenePlan, mip_levels};
 
 /// Bytes staged at once: rows are copied in bands of this size, so that staging stays small beside the field.
 const STAGING: u64 = 32 << 20;
@@ -23,7 +24,7 @@ pub fn heights(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image>
 pub fn ceiling(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     match field.ceiling().filter(|_| plan.ceiling) {
         Some(ceiling) => surface(gpu, plan, "ceiling", ceiling),
-        None => picture(gpu, "no ceiling", vk::Format::R32_SFLOAT, [1, 1], true, &[0; 4]),
+        None => one_texel(gpu, "no ceiling", vk::Format::R32_SFLOAT, Some(1), &[0; 4]),
     }
 }
 
@@ -41,31 +42,51 @@ fn surface(gpu: &Arc<Gpu>, plan: &ScenePlan, purpose: &'static str, field: &Fiel
 /// One byte a sample, not 0 for holes; a stand-in of one texel if the plan leaves holes out.
 pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     if !plan.holes {
-        return picture(gpu, "no holes", vk::Format::R8_UINT, [1, 1], true, &[0]);
+        return one_texel(gpu, "no holes", vk::Format::R8_UINT, Some(1), &[0]);
     }
     paged(gpu, plan, "hole mask", vk::Format::R8_UINT, 1, |first, count, row| {
         row.extend((first..first + count).map(|k| u8::from(field.holes().contains(k))));
     })
 }
 
-/// A picture laid over the field; a stand-in of one texel if there is none.
-pub fn overlay(gpu: &Arc<Gpu>, picture_: Option<&image::RgbaImage>) -> Result<Image> {
-    match picture_ {
-        Some(rgba) => picture(gpu, "overlay", vk::Format::R8G8B8A8_SRGB, rgba.dimensions().into(), false, rgba),
-        None => picture(gpu, "no overlay", vk::Format::R8G8B8A8_SRGB, [1, 1], false, &[255; 4]),
+/// A picture laid over the field, with its mipmap levels; a stand-in of one texel if there is none.
+pub fn overlay(gpu: &Arc<Gpu>, picture: Option<&image::RgbaImage>) -> Result<Image> {
+    match picture {
+        Some(rgba) => {
+            let (size, format) = (rgba.dimensions().into(), vk::Format::R8G8B8A8_SRGB);
+            let image = filled(gpu, "overlay", format, size, (None, mip_levels(size)), rgba)?;
+            mipmaps::make(gpu, &image, mip_levels(size))?;
+            Ok(image)
+        }
+        None => one_texel(gpu, "no overlay", vk::Format::R8G8B8A8_SRGB, None, &[255; 4]),
     }
 }
 
-fn picture(
+/// A stand-in of one texel, ready for sampling.
+fn one_texel(
+    gpu: &Arc<Gpu>,
+    purpose: &'static str,
+    format: vk::Format,
+    layers: Option<u32>,
+    texel: &[u8],
+) -> Result<Image> {
+    let image = filled(gpu, purpose, format, [1, 1], (layers, 1), texel)?;
+    finish(gpu, &image)?;
+    Ok(image)
+}
+
+/// An image with the texels of its finest level, not yet ready for sampling.
+fn filled(
     gpu: &Arc<Gpu>,
     purpose: &'static str,
     format: vk::Format,
     size: [u32; 2],
-    array: bool,
+    (layers, levels): (Option<u32>, u32),
     data: &[u8],
 ) -> Result<Image> {
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-    let image = Image::new(gpu, ImageInfo { purpose, size, layers: array.then_some(1), format, usage })?;
+    let copied = if levels > 1 { vk::ImageUsageFlags::TRANSFER_SRC } else { vk::ImageUsageFlags::empty() };
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | copied;
+    let image = Image::with_levels(gpu, ImageInfo { purpose, size, layers, format, usage }, levels)?;
     let row = data.len() as u64 / u64::from(size[1]);
     upload(gpu, &image, 1, size, row, |_, y, rows, staging| {
         staging.extend_from_slice(&data[y as usize * row as usize..(y + rows) as usize * row as usize]);
@@ -96,10 +117,29 @@ fn paged(
             staging.resize(staging.len() + (size[0] as usize - width) * texel as usize, 0);
         }
     })?;
+    finish(gpu, &image)?;
     Ok(image)
 }
 
-/// Fills all layers band by band and leaves the image ready for sampling. `fill(layer, first row, rows, out)`
+/// As copies write an image.
+pub(super) const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
+    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+/// As any shader samples it.
+pub(super) const SAMPLED: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
+    vk::PipelineStageFlags2::ALL_COMMANDS,
+    vk::AccessFlags2::SHADER_SAMPLED_READ,
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+);
+
+/// Makes a written image ready for sampling.
+fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
+    once(gpu, |r| {
+        barriers(gpu, r.commands, &[image.barrier(WRITTEN, SAMPLED)]);
+        Ok(())
+    })
+}
+
+/// Fills the finest level of all layers band by band, and leaves the image as copies write it. `fill(layer, first row, rows, out)`
 /// appends the rows' bytes.
 fn upload(
     gpu: &Arc<Gpu>,
@@ -111,10 +151,9 @@ fn upload(
 ) -> Result<()> {
     let band = ((STAGING / row_bytes) as u32).clamp(1, size[1]);
     let mut staging = Buffer::host(gpu, "staging", u64::from(band) * row_bytes, vk::BufferUsageFlags::TRANSFER_SRC)?;
-    use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-    let ready = (Stage::COPY, Access::TRANSFER_WRITE, Layout::TRANSFER_DST_OPTIMAL);
+    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
     once(gpu, |r| {
-        barriers(gpu, r.commands, &[image.barrier((Stage::NONE, Access::NONE, Layout::UNDEFINED), ready)]);
+        barriers(gpu, r.commands, &[image.barrier(nothing, WRITTEN)]);
         Ok(())
     })?;
     let mut bytes = Vec::new();
@@ -136,18 +175,13 @@ fn upload(
             once(gpu, |r| {
                 // SAFETY: staging and image outlive the wait in `once`.
                 unsafe {
-                    let layout = Layout::TRANSFER_DST_OPTIMAL;
-                    gpu.raw.cmd_copy_buffer_to_image(r.commands, staging.raw, image.raw, layout, &region);
+                    gpu.raw.cmd_copy_buffer_to_image(r.commands, staging.raw, image.raw, WRITTEN.2, &region);
                 }
                 Ok(())
             })?;
         }
     }
-    once(gpu, |r| {
-        let sampled = (Stage::ALL_COMMANDS, Access::SHADER_SAMPLED_READ, Layout::SHADER_READ_ONLY_OPTIMAL);
-        barriers(gpu, r.commands, &[image.barrier(ready, sampled)]);
-        Ok(())
-    })
+    Ok(())
 }
 
 /// How an image is sampled.
@@ -159,6 +193,8 @@ pub enum Sampling {
     Clamped,
     /// Linear, repeating.
     Repeated,
+    /// Linear, repeating along some axes (x, z) and with the edge texel beyond the edge of others.
+    Along([bool; 2]),
 }
 
 /// A sampler. What uses it has ended when it is dropped.
@@ -179,20 +215,25 @@ impl Drop for Sampler {
 pub fn sampler(gpu: &Arc<Gpu>, sampling: Sampling) -> Result<Sampler> {
     let (filter, mipmap) = match sampling {
         Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),
-        Sampling::Clamped | Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
+        _ => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
     };
-    let (mode, name) = match sampling {
-        Sampling::Texels => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
-        Sampling::Clamped => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
-        Sampling::Repeated => (vk::SamplerAddressMode::REPEAT, "repeating sampler"),
+    let (repeats, name) = match sampling {
+        Sampling::Texels => ([false; 2], "texel sampler"),
+        Sampling::Clamped => ([false; 2], "clamping sampler"),
+        Sampling::Repeated => ([true; 2], "repeating sampler"),
+        Sampling::Along(repeats) => (repeats, "overlay sampler"),
     };
+    let [u, v] = repeats.map(|repeats| match repeats {
+        true => vk::SamplerAddressMode::REPEAT,
+        false => vk::SamplerAddressMode::CLAMP_TO_EDGE,
+    });
     let info = vk::SamplerCreateInfo::default()
         .mag_filter(filter)
         .min_filter(filter)
         .mipmap_mode(mipmap)
-        .address_mode_u(mode)
-        .address_mode_v(mode)
-        .address_mode_w(mode)
+        .address_mode_u(u)
+        .address_mode_v(v)
+        .address_mode_w(u)
         .max_lod(vk::LOD_CLAMP_NONE);
     // SAFETY: the device is alive.
     let raw = unsafe { gpu.raw.create_sampler(&info, None) }?;

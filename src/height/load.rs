@@ -6,7 +6,9 @@ use std::{
     path::Path,
 };
 
-use super::{Error, Field, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, terrain_rgb, tiles, usgs_dem};
+use super::{
+    Error, Field, Footprint, archive, asc, bil, geotiff, hgt, png, raster::Raster, raw, terrain_rgb, tiles, usgs_dem,
+};
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
 /// What is done with samples without data.
@@ -72,6 +74,8 @@ pub struct Loaded {
     pub sample_type: String,
     /// Whether 16 bits a sample hold every height without loss.
     pub exact_in_16_bit: bool,
+    /// Which part of the file it is, and where that lies.
+    pub footprint: Footprint,
     /// What the user should know, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -132,7 +136,7 @@ fn open(path: &Path) -> Result<(File, u64), Error> {
 const SIBLING_BYTES: u64 = 1 << 20;
 
 /// The file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
-fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
+pub(super) fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
     let mut appended = path.as_os_str().to_owned();
     appended.push(format!(".{extension}"));
     let upper = extension.to_uppercase();

@@ -17,11 +17,13 @@ pub(crate) mod kept;
 pub mod level_errors;
 pub mod levels;
 mod load;
+mod located;
 mod png;
 pub mod progress;
 mod raster;
 mod raw;
 mod replace;
+mod rounding;
 pub mod rtin;
 mod sample;
 pub mod save;
@@ -33,8 +35,9 @@ mod tiff_directory;
 mod tiles;
 mod usgs_dem;
 
-pub use georef::metres_per_degree;
+pub use georef::{Place, Unit, metres_per_degree};
 pub use load::{Encoding, HoleFill, Loaded, Options, RawLayout, load, load_bytes, load_bytes_with};
+pub use located::{Footprint, Located, place_of};
 pub use sample::{Order, SampleType};
 
 use std::ops::Range;

@@ -4,6 +4,8 @@ use super::{
     Error, Field, Holes, Samples,
     georef::Place,
     load::{HoleFill, Loaded, Options},
+    located::Footprint,
+    rounding,
 };
 
 /// Samples as a file stores them, before crop, holes and metres.
@@ -53,24 +55,28 @@ impl Raster {
 
     /// Applies the wishes and makes the field.
     pub fn finish(mut self, name: &str, options: &Options) -> Result<Loaded, Error> {
+        let whole = self.size;
         self.rearrange(name, options)?;
         self.make_holes(options);
         let range = self.check_range();
         self.blank_holes(range);
         self.samples = self.samples.compacted();
         self.scale(name, options, range)?;
+        self.warnings.extend(rounding::warning(&self.sample_type, range, self.step * self.unit));
         let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
         let (spacing, origin) = self.lie(name, options)?;
         let tiles = tiles(name, self.size, options)?;
 
         let mut field = Field::new(self.samples, self.size, spacing, self.holes).tiled(tiles);
         field.origin = origin;
-        field.crs = self.place.and_then(|place| place.crs);
+        field.crs = self.place.as_ref().and_then(|place| place.crs.clone());
         if options.hole_fill == HoleFill::Interpolate {
             field = field.without_holes();
         }
-        let Self { format, sample_type, warnings, .. } = self;
-        Ok(Loaded { field, format, sample_type, exact_in_16_bit, warnings })
+        let Self { format, sample_type, place, warnings, .. } = self;
+        let first = options.crop.map_or([0, 0], |[x, z, ..]| [x, z]);
+        let footprint = Footprint { whole, first, place };
+        Ok(Loaded { field, format, sample_type, exact_in_16_bit, footprint, warnings })
     }
 
     /// Crops, and turns the rows to run from north to south and the columns from west to east.
