@@ -203,6 +203,8 @@ impl Session {
         let [x, y, z] = self.camera.eye.to_array();
         let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
         let frozen = if self.frozen { ", frozen" } else { "" };
+        // To a hundredth of the terrain at least.
+        let digits = (2.0 - self.site.diagonal().log10()).ceil().clamp(0.0, 9.0) as usize;
         let wide = self.camera.width().map(|width| format!(", {} wide", length_text(width))).unwrap_or_default();
         let wire = if self.look.wireframe { ", edges" } else { "" };
         let mut rows = vec![
@@ -221,7 +223,7 @@ impl Session {
                 "camera",
                 format!("{}, {}/s{wide}", self.camera.mode_name(), length_text(self.camera.speed(&self.site))),
             ),
-            row("position", format!("{x:.0} {y:.0} {z:.0} m")),
+            row("position", format!("{x:.digits$} {y:.digits$} {z:.digits$} m")),
             row("above ground", length_text(self.camera.above_ground(&self.site))),
         ];
         rows.extend(figures.maps.map(|maps| row("texels", maps.to_string())));

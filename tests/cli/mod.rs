@@ -1,6 +1,8 @@
 //! The program, run as a person runs it.
 
 mod endless;
+#[cfg(feature = "vulkan")]
+mod overlays;
 mod robust;
 #[cfg(feature = "vulkan")]
 mod with_a_device;
