@@ -156,7 +156,7 @@ vec3 error_colour(float px) {
 vec2 overlay_share(vec2 lattice) {
     vec2 share = lattice * frame.overlay_scale + frame.overlay_first;
     vec2 period = frame.overlay_period;
-    return share - period * floor(share / mix(period, vec2(1.0), equal(period, vec2(0.0))));
+    return share - period * floor(share / mix(period, vec2(1.0), equal(period, vec2(0.0)))) + frame.overlay_start;
 }
 
 // Whether the overlay lies there. Its sides may be rounded.

@@ -123,6 +123,7 @@ impl Look {
             overlay_first: overlay.first,
             overlay_scale: overlay.scale,
             overlay_period: overlay.period,
+            overlay_start: overlay.start,
             pixel_slope: slope as f32,
             pixel_size: size as f32,
             ..placing

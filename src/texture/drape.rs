@@ -16,16 +16,18 @@ pub struct Drape {
     pub ends: bool,
 }
 
-/// A drape as shaders apply it: share of the picture's side = samples from a lattice position · scale + first, less
-/// whole periods.
+/// A drape as shaders apply it: share of the picture's side = (samples from a lattice position · scale + first, less
+/// whole periods) + start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
-    /// Share of the side at the lattice position, within the first period.
+    /// Shares from the start of a tile to the lattice position.
     pub first: [f32; 2],
     /// Shares a sample.
     pub scale: [f32; 2],
     /// Shares after which the picture repeats; 0: it does not.
     pub period: [f32; 2],
+    /// Share at the start of a tile.
+    pub start: [f32; 2],
 }
 
 impl Drape {
@@ -59,17 +61,18 @@ impl Drape {
 
     /// The same relative to a lattice position: no large number is rounded.
     pub fn shares(&self, anchor: [i32; 2]) -> Shares {
-        let period = |k: usize| self.period[k].map_or(0.0, f64::from);
-        let first = |k: usize| {
-            let from_start = f64::from(anchor[k]) - self.first[k];
-            let within = if self.period[k].is_some() { from_start.rem_euclid(period(k)) } else { from_start };
-            (within / self.length[k]) as f32
-        };
-        Shares {
-            first: [0, 1].map(first),
-            scale: self.length.map(|length| (1.0 / length) as f32),
-            period: [0, 1].map(|k| (period(k) / self.length[k]) as f32),
-        }
+        let axes = [0, 1].map(|k| {
+            let (at, first, length) = (f64::from(anchor[k]), self.first[k], self.length[k]);
+            match self.period[k].map(f64::from) {
+                None => [at - first, 0.0, 0.0],
+                // A tile of the picture itself begins at its side, any other at the field's first sample.
+                Some(period) if period == length => [(at - first).rem_euclid(period), period, 0.0],
+                Some(period) => [at.rem_euclid(period), period, -first],
+            }
+            .map(|samples| (samples / length) as f32)
+        });
+        let [first, period, start] = [0, 1, 2].map(|n| axes.map(|axis| axis[n]));
+        Shares { first, scale: self.length.map(|length| (1.0 / length) as f32), period, start }
     }
 }
 
@@ -85,10 +88,10 @@ mod tests {
 
     /// What the shader computes, in single precision.
     fn share(drape: &Drape, anchor: [i32; 2], from_anchor: [f32; 2]) -> [f32; 2] {
-        let Shares { first, scale, period } = drape.shares(anchor);
+        let Shares { first, scale, period, start } = drape.shares(anchor);
         [0, 1].map(|k| {
             let share = from_anchor[k] * scale[k] + first[k];
-            if period[k] > 0.0 { share - period[k] * (share / period[k]).floor() } else { share }
+            start[k] + if period[k] > 0.0 { share - period[k] * (share / period[k]).floor() } else { share }
         })
     }
 
@@ -127,5 +130,8 @@ mod tests {
         let second = share(&drape, [210, 620], [0.0; 2]);
         assert!((0..2).all(|k| (first[k] - second[k]).abs() < 1e-6), "{first:?}, {second:?}");
         assert!((first[0] - 110.0 / 1024.0).abs() < 1e-6, "{first:?}");
+        // A tile ends with the field's last sample, wherever the picture begins.
+        let last = share(&drape, [200, 200], [199.5, 150.0]);
+        assert!((last[0] - 299.5 / 1024.0).abs() < 1e-6 && (last[1] - 250.0 / 1024.0).abs() < 1e-6, "{last:?}");
     }
 }
