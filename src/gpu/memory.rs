@@ -234,17 +234,6 @@ impl Image {
     ) -> vk::ImageMemoryBarrier2<'static> {
         image_barrier(self.raw, self.format, from, to)
     }
-
-    /// A barrier over one mipmap level.
-    pub fn level_barrier(
-        &self,
-        level: u32,
-        from: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
-        to: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
-    ) -> vk::ImageMemoryBarrier2<'static> {
-        let one = range(self.format).base_mip_level(level).level_count(1);
-        self.barrier(from, to).subresource_range(one)
-    }
 }
 
 impl Drop for Image {

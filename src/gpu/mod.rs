@@ -18,7 +18,6 @@ mod live;
 mod loss;
 mod materials;
 pub mod memory;
-mod mipmaps;
 pub mod oracle;
 pub mod pages;
 pub mod pipelines;

@@ -8,9 +8,10 @@ use ash::vk;
 use super::device::Gpu;
 use super::frames::once;
 use super::memory::{Buffer, Image, ImageInfo, barriers};
-use super::mipmaps;
 use crate::height::{Field, Samples};
 use crate::plan::{ScenePlan, mip_levels};
+use crate::texture::mipmaps;
+use crate::texture::page_maps::Picture;
 
 /// Bytes staged at once: rows are copied in bands of this size, so that staging stays small beside the field.
 const STAGING: u64 = 32 << 20;
@@ -51,18 +52,25 @@ pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
 
 /// A picture laid over the field, with its mipmap levels; a stand-in of one texel if there is none.
 pub fn overlay(gpu: &Arc<Gpu>, picture: Option<&image::RgbaImage>) -> Result<Image> {
-    match picture {
-        Some(rgba) => {
-            let (size, format) = (rgba.dimensions().into(), vk::Format::R8G8B8A8_SRGB);
-            let image = filled(gpu, "overlay", format, size, (None, mip_levels(size)), rgba)?;
-            mipmaps::make(gpu, &image, mip_levels(size))?;
-            Ok(image)
-        }
-        None => one_texel(gpu, "no overlay", vk::Format::R8G8B8A8_SRGB, None, &[255; 4]),
+    const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
+    let Some(rgba) = picture else { return one_texel(gpu, "no overlay", FORMAT, None, &[255; 4]) };
+    let (purpose, size) = ("overlay", rgba.dimensions().into());
+    let image = Image::with_levels(gpu, info(purpose, size, None, FORMAT), mip_levels(size))?;
+    begin(gpu, &image)?;
+    let mut finer = Picture { size, texels: bytemuck::cast_slice(rgba) };
+    level(gpu, &image, 0, finer.size, bytemuck::cast_slice(finer.texels))?;
+    let mut texels;
+    for n in 1..mip_levels(size) {
+        let next = mipmaps::halved(finer);
+        texels = next.1;
+        finer = Picture { size: next.0, texels: &texels };
+        level(gpu, &image, n, finer.size, bytemuck::cast_slice(finer.texels))?;
     }
+    finish(gpu, &image)?;
+    Ok(image)
 }
 
-/// A stand-in of one texel, ready for sampling.
+/// A stand-in of one texel.
 fn one_texel(
     gpu: &Arc<Gpu>,
     purpose: &'static str,
@@ -70,28 +78,24 @@ fn one_texel(
     layers: Option<u32>,
     texel: &[u8],
 ) -> Result<Image> {
-    let image = filled(gpu, purpose, format, [1, 1], (layers, 1), texel)?;
+    let image = Image::new(gpu, info(purpose, [1, 1], layers, format))?;
+    begin(gpu, &image)?;
+    level(gpu, &image, 0, [1, 1], texel)?;
     finish(gpu, &image)?;
     Ok(image)
 }
 
-/// An image with the texels of its finest level, not yet ready for sampling.
-fn filled(
-    gpu: &Arc<Gpu>,
-    purpose: &'static str,
-    format: vk::Format,
-    size: [u32; 2],
-    (layers, levels): (Option<u32>, u32),
-    data: &[u8],
-) -> Result<Image> {
-    let copied = if levels > 1 { vk::ImageUsageFlags::TRANSFER_SRC } else { vk::ImageUsageFlags::empty() };
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | copied;
-    let image = Image::with_levels(gpu, ImageInfo { purpose, size, layers, format, usage }, levels)?;
+fn info(purpose: &'static str, size: [u32; 2], layers: Option<u32>, format: vk::Format) -> ImageInfo {
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    ImageInfo { purpose, size, layers, format, usage }
+}
+
+/// Fills one level of an image without further layers.
+fn level(gpu: &Arc<Gpu>, image: &Image, level: u32, size: [u32; 2], data: &[u8]) -> Result<()> {
     let row = data.len() as u64 / u64::from(size[1]);
-    upload(gpu, &image, 1, size, row, |_, y, rows, staging| {
+    upload(gpu, image, (level, 1), size, row, |_, y, rows, staging| {
         staging.extend_from_slice(&data[y as usize * row as usize..(y + rows) as usize * row as usize]);
-    })?;
-    Ok(image)
+    })
 }
 
 fn paged(
@@ -104,10 +108,10 @@ fn paged(
 ) -> Result<Image> {
     let (size, [columns, rows]) = (plan.page_size(), plan.pages());
     let layers = columns * rows;
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-    let image = Image::new(gpu, ImageInfo { purpose, size, layers: Some(layers), format, usage })?;
+    let image = Image::new(gpu, info(purpose, size, Some(layers), format))?;
+    begin(gpu, &image)?;
     let stored = plan.stored;
-    upload(gpu, &image, layers, size, u64::from(size[0]) * texel, |layer, y, count, staging| {
+    upload(gpu, &image, (0, layers), size, u64::from(size[0]) * texel, |layer, y, count, staging| {
         let corner = [layer % columns * size[0], layer / columns * size[1]];
         for z in corner[1] + y..corner[1] + y + count {
             // What sticks out of the field is never read; it repeats the last row and stays short.
@@ -122,14 +126,23 @@ fn paged(
 }
 
 /// As copies write an image.
-pub(super) const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
+const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
 /// As any shader samples it.
-pub(super) const SAMPLED: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
+const SAMPLED: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
     vk::PipelineStageFlags2::ALL_COMMANDS,
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
+
+/// Makes a new image ready for copies.
+fn begin(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
+    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+    once(gpu, |r| {
+        barriers(gpu, r.commands, &[image.barrier(nothing, WRITTEN)]);
+        Ok(())
+    })
+}
 
 /// Makes a written image ready for sampling.
 fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
@@ -139,23 +152,18 @@ fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
     })
 }
 
-/// Fills the finest level of all layers band by band, and leaves the image as copies write it. `fill(layer, first row, rows, out)`
+/// Fills a level of all layers of an image that is ready for copies, band by band. `fill(layer, first row, rows, out)`
 /// appends the rows' bytes.
 fn upload(
     gpu: &Arc<Gpu>,
     image: &Image,
-    layers: u32,
+    (level, layers): (u32, u32),
     size: [u32; 2],
     row_bytes: u64,
     fill: impl Fn(u32, u32, u32, &mut Vec<u8>),
 ) -> Result<()> {
     let band = ((STAGING / row_bytes) as u32).clamp(1, size[1]);
     let mut staging = Buffer::host(gpu, "staging", u64::from(band) * row_bytes, vk::BufferUsageFlags::TRANSFER_SRC)?;
-    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
-    once(gpu, |r| {
-        barriers(gpu, r.commands, &[image.barrier(nothing, WRITTEN)]);
-        Ok(())
-    })?;
     let mut bytes = Vec::new();
     for layer in 0..layers {
         for y in (0..size[1]).step_by(band as usize) {
@@ -167,6 +175,7 @@ fn upload(
                 .image_subresource(
                     vk::ImageSubresourceLayers::default()
                         .aspect_mask(vk::ImageAspectFlags::COLOR)
+                        .mip_level(level)
                         .base_array_layer(layer)
                         .layer_count(1),
                 )

@@ -7,6 +7,7 @@ pub mod ground;
 pub mod ground_maps;
 pub mod hidden;
 pub mod mip_spheres;
+pub mod mipmaps;
 pub mod node_table;
 mod noise;
 pub mod page_maps;

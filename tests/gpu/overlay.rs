@@ -160,8 +160,8 @@ fn a_placed_picture_ends_at_its_sides() {
         let drape = Drape { period: STORED.map(Some), ..drape };
         check(gpu, field().tiled([8000, 4]), Some(drape), [64.0 * 7900.0, 130.0], share);
         // Between two samples of a wide field.
-        let drape = Drape { first: [30.25, 20.5], length: [20.0, 15.0], period: [None; 2], ends: true };
-        check(gpu, field(), Some(drape), [32.0, 24.0], |p| within([(p[0] - 30.25) / 20.0, (p[1] - 20.5) / 15.0]));
+        let drape = Drape { first: [5.25, 12.5], length: [50.5, 40.25], period: [None; 2], ends: true };
+        check(gpu, field(), Some(drape), [32.0, 24.0], |p| within([(p[0] - 5.25) / 50.5, (p[1] - 12.5) / 40.25]));
     });
 }
 
