@@ -23,5 +23,7 @@ void main() {
     vec4 point = in_far + depth * in_near;
     vec3 relative = point.xyz / point.w;
     vec2 lattice = (relative.xz - frame.anchor_relative) / frame.spacing;
-    out_colour = vec4(land_colour(relative, lattice, normal_at(relative, lattice), uvec2(0)), 1.0);
+    // At edges of the land the step is between two surfaces: that costs no more.
+    vec4 steps = vec4(dFdx(lattice), dFdy(lattice));
+    out_colour = vec4(land_colour(relative, lattice, steps, normal_at(relative, lattice), uvec2(0)), 1.0);
 }

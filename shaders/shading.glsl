@@ -15,9 +15,13 @@ layout(constant_id = 5) const uint COLOUR = 0;
 // The height texture can be filtered linearly by the device.
 layout(constant_id = 6) const bool FILTERED = false;
 
-// Side of a page of the overlay as a power of two; 0: it is there as a whole. For the ground: parts of a sample of which
-// 2^32 are the root square's side, as a power of two.
+// For the ground: parts of a sample of which 2^32 are the root square's side, as a power of two.
 layout(constant_id = 13) const uint MAP_SHIFT = 0;
+// The overlay's sides in pages, where it is there in parts; 0: it is there as a whole.
+layout(constant_id = 14) const float MAP_COLUMNS = 0.0;
+layout(constant_id = 15) const float MAP_ROWS = 0.0;
+// The overlay ends at its sides: beyond them the land has its own colour.
+layout(constant_id = 16) const bool OVERLAY_ENDS = false;
 
 bool is_hole(ivec2 at) {
     return texelFetch(hole_pages, texel(clamp(at, ivec2(0), frame.last)), 0).r != 0;
@@ -104,7 +108,10 @@ vec3 normal_at(vec3 relative, vec2 lattice) {
 
 // From 0 at the lowest sample to 1 at the highest.
 float share_of_range(float height) {
-    return clamp((height - frame.height_range.x) / max(frame.height_range.y - frame.height_range.x, 1e-6), 0.0, 1.0);
+    float low = frame.height_range.x, high = frame.height_range.y;
+    // What is flat has no range but that of rounding.
+    float least = 1e-6 * max(frame.spacing.x, max(abs(low), abs(high)));
+    return clamp((height - low) / max(high - low, least), 0.0, 1.0);
 }
 
 // Hypsometric tint: green lowland, ochre slopes, grey rock, snow.
@@ -145,18 +152,30 @@ vec3 error_colour(float px) {
     return px > 1.0 ? vec3(1.0) : high;
 }
 
-// The picture laid over the field. A tile's first and last texels are its neighbours' too, so that linear filtering
-// within it leaves no seam.
+// Shares of the overlay's sides at a lattice position relative to the anchor.
+vec2 overlay_share(vec2 lattice) {
+    vec2 share = lattice * frame.overlay_scale + frame.overlay_first;
+    vec2 period = frame.overlay_period;
+    return share - period * floor(share / mix(period, vec2(1.0), equal(period, vec2(0.0)))) + frame.overlay_start;
+}
+
+// Whether the overlay lies there. Its sides may be rounded.
+bool is_covered(vec2 share) {
+    return !OVERLAY_ENDS || all(lessThanEqual(abs(share - 0.5), vec2(0.5 + 1e-6)));
+}
+
+// A part of a picture. A tile's first and last texels are its neighbours' too, so that linear filtering within it leaves
+// no seam.
 struct Tile { vec2 share; uint slot; uint level; };
 
-Tile tile_at(Cell cell) {
-    uvec2 page = uvec2(cell.at) >> MAP_SHIFT;
-    uint columns = (uint(frame.last.x) + (1u << MAP_SHIFT) - 1u) >> MAP_SHIFT;
-    uint entry = map_table[page.y * columns + page.x];
-    uint shift = MAP_SHIFT + (entry & 15u);
-    ivec2 first = (cell.at >> shift) << shift;
-    vec2 share = (vec2(cell.at - first) + cell.inside) / float(1u << shift);
-    return Tile(share, entry >> 4, entry & 15u);
+Tile tile_at(vec2 share) {
+    vec2 extent = vec2(MAP_COLUMNS, MAP_ROWS);
+    uvec2 pages = uvec2(ceil(extent));
+    vec2 at = clamp(share, 0.0, 1.0) * extent;
+    uvec2 page = min(uvec2(at), pages - 1u);
+    uint entry = map_table[page.y * pages.x + page.x];
+    uint level = entry & 15u;
+    return Tile((at - vec2((page >> level) << level)) / float(1u << level), entry >> 4, level);
 }
 
 // The smallest node of the ground's map around a place that has texels.
@@ -182,9 +201,10 @@ vec3 texels(Tile tile) {
     return textureLod(maps, vec3((tile.share * (side - 1.0) + 0.5) / side, float(tile.slot)), 0.0).rgb;
 }
 
-vec3 overlay_albedo(Cell cell, vec2 lattice) {
-    if (MAP_SHIFT == 0) return texture(overlay, (lattice + vec2(frame.anchor)) / vec2(frame.last)).rgb;
-    return texels(tile_at(cell));
+// `steps`: how the lattice position changes from pixel to pixel, along x and y.
+vec3 overlay_albedo(vec2 share, vec4 steps) {
+    if (MAP_COLUMNS != 0.0) return texels(tile_at(share));
+    return textureGrad(overlay, share, steps.xy * frame.overlay_scale, steps.zw * frame.overlay_scale).rgb;
 }
 
 // Which tile that is: a hue a level, with a dark edge.
@@ -198,13 +218,20 @@ bool is_open(vec2 lattice) {
     return HOLES && in_hole(cell_at(lattice));
 }
 
-// Colour of the surface at a point relative to the eye over a lattice position relative to the anchor.
-vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
+// Colour of the surface at a point relative to the eye over a lattice position relative to the anchor, which changes by
+// `steps` from pixel to pixel, along x and y.
+vec3 land_colour(vec3 relative, vec2 lattice, vec4 steps, vec3 normal, uvec2 level_batch) {
     Cell cell = cell_at(lattice);
     float distance = length(relative);
     float pixel = pixel_at(relative);
     float height = height_of(relative);
 
+    bool is_overlaid = COLOUR == 2 || COLOUR == 6;
+    vec2 share = vec2(0.0);
+    if (is_overlaid) {
+        share = overlay_share(lattice);
+        is_overlaid = is_covered(share);
+    }
     vec3 albedo;
     vec3 ground = vec3(0.0);
     if (DETAIL && (COLOUR == 0 || COLOUR == 2)) {
@@ -213,8 +240,8 @@ vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
         ground = ground_albedo(spot, share_of_range(height), normal);
     }
     if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
-    else if (COLOUR == 2) albedo = overlay_albedo(cell, lattice);
-    else if (COLOUR == 6) albedo = MAP_SHIFT == 0 ? overlay_albedo(cell, lattice) : tile_colour(tile_at(cell));
+    else if (COLOUR == 6 && MAP_COLUMNS != 0.0 && is_overlaid) albedo = tile_colour(tile_at(share));
+    else if (is_overlaid) albedo = overlay_albedo(share, steps);
     else if (COLOUR == 7) albedo = texels(ground_at(cell));
     else if (COLOUR == 8) albedo = tile_colour(ground_at(cell));
     else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
@@ -222,7 +249,7 @@ vec3 land_colour(vec3 relative, vec2 lattice, vec3 normal, uvec2 level_batch) {
     else if (DETAIL) albedo = ground;
     else albedo = CEILING ? rock(height) : tint(height, normal);
     // Under a picture from above the ground is lighter or darker than it is on average.
-    if (DETAIL && COLOUR == 2) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
+    if (DETAIL && COLOUR == 2 && is_overlaid) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
 
     vec3 colour = albedo;
     if (COLOUR == 4) {

@@ -16,6 +16,8 @@ layout(location = 3) in vec3 in_normal;
 layout(location = 0) out vec4 out_colour;
 
 void main() {
+    // Before anything is discarded: then neighbours still have the position.
+    vec4 steps = vec4(dFdx(in_lattice), dFdy(in_lattice));
     if (is_open(in_lattice)) discard;
     // Alpha tells a skirt from the surface.
     bool is_skirt = SKIRTS && (in_level_batch.x & SKIRT) != 0;
@@ -24,5 +26,5 @@ void main() {
 #else
     vec3 normal = normal_at(in_relative, in_lattice);
 #endif
-    out_colour = vec4(land_colour(in_relative, in_lattice, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
+    out_colour = vec4(land_colour(in_relative, in_lattice, steps, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
 }

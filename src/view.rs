@@ -80,6 +80,12 @@ pub struct Tolerance {
     pub metric: Metric,
 }
 
+/// Returns the near plane of a view for which none is given, metres: a thousandth of the height above ground, at least
+/// 0.1 m, or a two-hundredth of the terrain's diagonal if that is less.
+pub fn default_near(above_ground_m: f64, diagonal_m: f64) -> f64 {
+    (above_ground_m.abs() / 1000.0).max((diagonal_m / 200.0).min(0.1))
+}
+
 /// One view of the world: everything a technique may base its choice on.
 #[derive(Clone, Copy, Debug)]
 pub struct View {

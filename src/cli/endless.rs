@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow, bail};
 
 use crate::height::bezier::{Bezier, LAYERS};
-use crate::height::{Field, Loaded, Options};
+use crate::height::{Field, Footprint, Loaded, Options};
 
 /// The land called `endless` or `endless:SEED`, unless a file has that name.
 pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
@@ -37,6 +37,7 @@ fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
         format: "endless",
         sample_type,
         exact_in_16_bit: false,
+        footprint: Footprint::default(),
         warnings: Vec::new(),
         sources: Vec::new(),
     })

@@ -111,7 +111,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         report::print(common, &Info::of(&loaded))?;
         return Ok(Outcome::Done);
     }
-    plan::run(common, args, &args.terrain.join(" "), &Arc::new(loaded.field))
+    plan::run(common, args, &args.terrain.join(" "), loaded)
 }
 
 #[cfg(not(feature = "vulkan"))]

@@ -7,6 +7,7 @@ pub mod export;
 pub mod info;
 pub mod interrupt;
 pub mod numbers;
+pub mod overlay;
 pub mod plan;
 #[cfg(feature = "vulkan")]
 pub mod profile;

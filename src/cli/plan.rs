@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::info::InfoArgs;
 use super::{Common, Outcome, report};
-use crate::height::Field;
+use crate::height::{Field, Loaded};
 use crate::lod::Technique;
 use crate::plan::{Decision, Look, ScenePlan};
 
@@ -72,8 +72,9 @@ struct Figure {
 }
 
 /// Runs the subcommand for a field that was read.
-pub fn run(common: &Common, args: &InfoArgs, terrain: &str, field: &Arc<Field>) -> Result<Outcome> {
-    let (look, overlay) = args.look.build(terrain)?;
+pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> Result<Outcome> {
+    let field = &Arc::new(loaded.field);
+    let (look, overlay) = args.look.build(common, terrain, (field, &loaded.footprint))?;
     let (entry, _) = args.technique.settings()?;
     let technique = args.technique.build(common, field)?;
     let (plan, savings) = plan(common, args, (field, &look, overlay.as_ref()), technique.as_ref())?;

@@ -12,7 +12,7 @@ use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, endless, report};
 use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;
-use crate::height::Field;
+use crate::height::{Field, Loaded};
 use crate::lod::Settings;
 use crate::plan::ScenePlan;
 use crate::profile::run::Measured;
@@ -75,9 +75,10 @@ struct Capture {
 
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
-    let field = Arc::new(args.terrain.load(common)?.field);
+    let Loaded { field, footprint, .. } = args.terrain.load(common)?;
+    let field = Arc::new(field);
     endless::need_samples(&field, "profile")?;
-    let (look, overlay) = args.look.build(&args.terrain.name())?;
+    let (look, overlay) = args.look.build(common, &args.terrain.name(), (&field, &footprint))?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
     let gpu = open(common, false)?;

@@ -14,7 +14,7 @@ use crate::bench::rows::extended;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::{Choice, Gpu, Instance};
-use crate::height::Error;
+use crate::height::{Error, Loaded};
 use crate::lod::Technique;
 use crate::measure::geometric::{self, Summary};
 use crate::measure::watertight;
@@ -133,11 +133,12 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     if args.output.extension().and_then(|e| e.to_str()).is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(Error::new(output, "extension", "expected .png").into());
     }
-    let field = Arc::new(args.terrain.load(common)?.field);
+    let Loaded { field, footprint, .. } = args.terrain.load(common)?;
+    let field = Arc::new(field);
     if args.measure {
         endless::need_samples(&field, "--measure")?;
     }
-    let (look, overlay) = args.look.build(&args.terrain.name())?;
+    let (look, overlay) = args.look.build(common, &args.terrain.name(), (&field, &footprint))?;
     ensure!(args.time.is_finite(), "--time {}: expected seconds", args.time);
     let look = look.after(args.time);
     let view = args.view.build(&field, args.technique.tolerance()?)?;

@@ -8,13 +8,16 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::numbers::{nodata, numbers, spacing};
+use super::overlay::Picture;
 use super::whole::Whole;
 use super::{Common, endless, report, several};
 use crate::height::cave::Cave;
-use crate::height::{Encoding, Error, Field, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes};
+use crate::height::{
+    Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes,
+};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Forced, Look};
-use crate::view::{Lens, Metric, Tolerance, View};
+use crate::view::{Lens, Metric, Tolerance, View, default_near};
 
 /// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
 /// a tenth of a millimetre.
@@ -106,7 +109,8 @@ pub struct ViewArgs {
     /// Pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Near plane, metres; by default a thousandth of the height above ground, at least 0.1.
+    /// Near plane, metres; by default a thousandth of the height above ground, at least 0.1 m (less on a terrain of less
+    /// than 20 m).
     #[arg(long, value_name = "M")]
     pub near: Option<f64>,
     /// Orthographic, with a picture this many metres wide.
@@ -137,7 +141,7 @@ pub struct LookArgs {
     /// What colours say; `overlay` if a picture is given, else `height`.
     #[arg(long, value_enum)]
     pub colour: Option<ColourArg>,
-    /// A picture laid over the field.
+    /// A picture laid over the field: where its GeoTIFF tags or its world file say, else over all of the file's samples.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
     /// Device memory for the overlay, or for the texels of `--colour ground`, megabytes: what is larger is there in parts,
@@ -351,8 +355,13 @@ impl LookArgs {
         1_000_000 * self.texture_memory
     }
 
-    /// The look, and the picture it lays over the field.
-    pub fn build(&self, terrain: &str) -> Result<(Look, Option<image::RgbaImage>)> {
+    /// The look of a field that was read from `terrain`, and the picture it lays over.
+    pub fn build(
+        &self,
+        common: &Common,
+        terrain: &str,
+        (field, footprint): (&Field, &Footprint),
+    ) -> Result<(Look, Option<image::RgbaImage>)> {
         let colour = match (self.colour, &self.overlay) {
             (Some(ColourArg::Height), _) => Colour::Height,
             (Some(ColourArg::Level), _) => Colour::Level,
@@ -369,34 +378,43 @@ impl LookArgs {
             (None, None) if is_demo(terrain) => Colour::Overlay,
             (None, None) => Colour::Height,
         };
-        let picture = match (&self.overlay, colour) {
-            (Some(path), Colour::Overlay | Colour::Maps) => Some(read_picture(path)?),
-            (None, Colour::Overlay | Colour::Maps) if is_demo(terrain) => {
-                Some(image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8())
-            }
-            (None, Colour::Overlay | Colour::Maps) => bail!("--colour: no picture given, expected --overlay IMG"),
-            _ => None,
-        };
+        let picture = self.picture(terrain, colour)?;
         let defaults = Look::default();
         let sun = self.sun.unwrap_or(defaults.sun);
         if !(self.fog.is_finite() && self.fog >= 0.0) {
             bail!("--fog {}: expected a density of 0 or more per metre", self.fog);
         }
         let look = Look { colour, sun, fog: self.fog, wireframe: self.wireframe, ..defaults };
-        let look = Look { texture_bytes: self.texture_bytes(), ..look };
-        Ok((self.ground.over(look)?, picture))
+        let drape = picture.as_ref().map(|picture| picture.drape(common, field, footprint)).transpose()?;
+        let look = Look { texture_bytes: self.texture_bytes(), drape, ..look };
+        Ok((self.ground.over(look)?, picture.map(|picture| picture.image)))
     }
 
-    /// The picture there is to lay over the field, whatever the colours say at first.
-    pub fn picture(&self, terrain: &str) -> Result<Option<image::RgbaImage>> {
-        Ok(LookArgs { colour: None, ..self.clone() }.build(terrain)?.1)
+    /// The same for a window: the picture is there whatever the colours say at first.
+    pub fn build_for_window(
+        &self,
+        common: &Common,
+        terrain: &str,
+        loaded: (&Field, &Footprint),
+    ) -> Result<(Look, Option<image::RgbaImage>)> {
+        let (look, picture) = self.build(common, terrain, loaded)?;
+        if picture.is_some() {
+            return Ok((look, picture));
+        }
+        let overlaid = LookArgs { colour: None, ..self.clone() };
+        let (Look { drape, .. }, picture) = overlaid.build(common, terrain, loaded)?;
+        Ok((Look { drape, ..look }, picture))
     }
-}
 
-fn read_picture(path: &str) -> Result<image::RgbaImage> {
-    let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
-    let reader = image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;
-    Ok(reader.decode().map_err(|e| fail(&e))?.into_rgba8())
+    /// The picture that colours need.
+    fn picture(&self, terrain: &str, colour: Colour) -> Result<Option<Picture>> {
+        match (&self.overlay, colour) {
+            (Some(path), Colour::Overlay | Colour::Maps) => Ok(Some(Picture::read(path)?)),
+            (None, Colour::Overlay | Colour::Maps) if is_demo(terrain) => Ok(Some(Picture::demo()?)),
+            (None, Colour::Overlay | Colour::Maps) => bail!("--colour: no picture given, expected --overlay IMG"),
+            _ => Ok(None),
+        }
+    }
 }
 
 /// Settings of a technique, with errors that name the flag at fault.
@@ -462,7 +480,7 @@ impl ViewArgs {
         let near = match self.near {
             Some(near) if !is_length(near) => bail!("--near {near:?}: expected {LENGTHS}"),
             Some(near) => near,
-            None => (above.abs() / 1000.0).clamp(0.1, FARTHEST_M),
+            None => default_near(above, 2.0 * whole.radius).min(FARTHEST_M),
         };
         let lens = match self.ortho {
             Some(width) if is_length(width) => {

@@ -7,9 +7,8 @@ use clap::Args;
 
 use super::info::Info;
 use super::{Common, Outcome, report};
-use crate::height::Loaded;
 use crate::height::synth::{self, Kind};
-use crate::height::{Samples, save};
+use crate::height::{Footprint, Loaded, Samples, save};
 
 /// Arguments.
 #[derive(Args, Debug)]
@@ -51,6 +50,7 @@ pub fn run(common: &Common, args: &SynthArgs) -> Result<Outcome> {
         format: "synth",
         sample_type,
         exact_in_16_bit: coded,
+        footprint: Footprint::default(),
         warnings: Vec::new(),
         sources: Vec::new(),
     };

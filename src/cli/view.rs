@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
 use super::{Common, Outcome, interrupt, render, report};
+use crate::height::Loaded;
 use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;
 use crate::viewer::{self, Setup};
@@ -86,8 +87,9 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     let target = target(args)?;
     let technique = args.technique.settings()?;
     report::warn_of_idle(common, technique.0, &technique.1);
-    let field = Arc::new(args.terrain.load(common)?.field);
-    let (look, overlay) = args.look.build(&args.terrain.name())?;
+    let Loaded { field, footprint, .. } = args.terrain.load(common)?;
+    let field = Arc::new(field);
+    let (look, overlay) = args.look.build_for_window(common, &args.terrain.name(), (&field, &footprint))?;
     let summary = viewer::run(&Setup {
         name: args.terrain.name(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
@@ -95,7 +97,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         near: args.view.near,
         technique,
         choices: args.technique.settings.clone(),
-        overlay: overlay.or(args.look.picture(&args.terrain.name())?),
+        overlay,
         look,
         choice: render::choice(common),
         validate: common.validate,

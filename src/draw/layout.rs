@@ -86,6 +86,14 @@ shared! {
         detail_first: vec2,
         /// Repetitions of the ground's materials a sample (x, z).
         detail_scale: vec2,
+        /// Shares of the overlay's sides (x, z) from the start of a tile to the anchor.
+        overlay_first: vec2,
+        /// Shares of the overlay's sides a sample (x, z).
+        overlay_scale: vec2,
+        /// Shares after which the overlay repeats (x, z); 0: it does not.
+        overlay_period: vec2,
+        /// Share of the overlay's sides (x, z) at the start of a tile.
+        overlay_start: vec2,
         /// Bits of corners' positions that are parts of a sample: the list's.
         fraction_bits: int,
         /// The height that heights of vertices are relative to, metres: the list's.

@@ -9,7 +9,9 @@ use super::device::Gpu;
 use super::frames::once;
 use super::memory::{Buffer, Image, ImageInfo, barriers};
 use crate::height::{Field, Samples};
-use crate::plan::ScenePlan;
+use crate::plan::{ScenePlan, mip_levels};
+use crate::texture::mipmaps;
+use crate::texture::page_maps::Picture;
 
 /// Bytes staged at once: rows are copied in bands of this size, so that staging stays small beside the field.
 const STAGING: u64 = 32 << 20;
@@ -23,7 +25,7 @@ pub fn heights(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image>
 pub fn ceiling(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     match field.ceiling().filter(|_| plan.ceiling) {
         Some(ceiling) => surface(gpu, plan, "ceiling", ceiling),
-        None => picture(gpu, "no ceiling", vk::Format::R32_SFLOAT, [1, 1], true, &[0; 4]),
+        None => one_texel(gpu, "no ceiling", vk::Format::R32_SFLOAT, Some(1), &[0; 4]),
     }
 }
 
@@ -41,36 +43,59 @@ fn surface(gpu: &Arc<Gpu>, plan: &ScenePlan, purpose: &'static str, field: &Fiel
 /// One byte a sample, not 0 for holes; a stand-in of one texel if the plan leaves holes out.
 pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     if !plan.holes {
-        return picture(gpu, "no holes", vk::Format::R8_UINT, [1, 1], true, &[0]);
+        return one_texel(gpu, "no holes", vk::Format::R8_UINT, Some(1), &[0]);
     }
     paged(gpu, plan, "hole mask", vk::Format::R8_UINT, 1, |first, count, row| {
         row.extend((first..first + count).map(|k| u8::from(field.holes().contains(k))));
     })
 }
 
-/// A picture laid over the field; a stand-in of one texel if there is none.
-pub fn overlay(gpu: &Arc<Gpu>, picture_: Option<&image::RgbaImage>) -> Result<Image> {
-    match picture_ {
-        Some(rgba) => picture(gpu, "overlay", vk::Format::R8G8B8A8_SRGB, rgba.dimensions().into(), false, rgba),
-        None => picture(gpu, "no overlay", vk::Format::R8G8B8A8_SRGB, [1, 1], false, &[255; 4]),
+/// A picture laid over the field, with its mipmap levels; a stand-in of one texel if there is none.
+pub fn overlay(gpu: &Arc<Gpu>, picture: Option<&image::RgbaImage>) -> Result<Image> {
+    const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
+    let Some(rgba) = picture else { return one_texel(gpu, "no overlay", FORMAT, None, &[255; 4]) };
+    let (purpose, size) = ("overlay", rgba.dimensions().into());
+    let image = Image::with_levels(gpu, info(purpose, size, None, FORMAT), mip_levels(size))?;
+    begin(gpu, &image)?;
+    let mut finer = Picture { size, texels: bytemuck::cast_slice(rgba) };
+    level(gpu, &image, 0, finer.size, bytemuck::cast_slice(finer.texels))?;
+    let mut texels;
+    for n in 1..mip_levels(size) {
+        let next = mipmaps::halved(finer);
+        texels = next.1;
+        finer = Picture { size: next.0, texels: &texels };
+        level(gpu, &image, n, finer.size, bytemuck::cast_slice(finer.texels))?;
     }
+    finish(gpu, &image)?;
+    Ok(image)
 }
 
-fn picture(
+/// A stand-in of one texel.
+fn one_texel(
     gpu: &Arc<Gpu>,
     purpose: &'static str,
     format: vk::Format,
-    size: [u32; 2],
-    array: bool,
-    data: &[u8],
+    layers: Option<u32>,
+    texel: &[u8],
 ) -> Result<Image> {
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-    let image = Image::new(gpu, ImageInfo { purpose, size, layers: array.then_some(1), format, usage })?;
-    let row = data.len() as u64 / u64::from(size[1]);
-    upload(gpu, &image, 1, size, row, |_, y, rows, staging| {
-        staging.extend_from_slice(&data[y as usize * row as usize..(y + rows) as usize * row as usize]);
-    })?;
+    let image = Image::new(gpu, info(purpose, [1, 1], layers, format))?;
+    begin(gpu, &image)?;
+    level(gpu, &image, 0, [1, 1], texel)?;
+    finish(gpu, &image)?;
     Ok(image)
+}
+
+fn info(purpose: &'static str, size: [u32; 2], layers: Option<u32>, format: vk::Format) -> ImageInfo {
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    ImageInfo { purpose, size, layers, format, usage }
+}
+
+/// Fills one level of an image without further layers.
+fn level(gpu: &Arc<Gpu>, image: &Image, level: u32, size: [u32; 2], data: &[u8]) -> Result<()> {
+    let row = data.len() as u64 / u64::from(size[1]);
+    upload(gpu, image, (level, 1), size, row, |_, y, rows, staging| {
+        staging.extend_from_slice(&data[y as usize * row as usize..(y + rows) as usize * row as usize]);
+    })
 }
 
 fn paged(
@@ -83,10 +108,10 @@ fn paged(
 ) -> Result<Image> {
     let (size, [columns, rows]) = (plan.page_size(), plan.pages());
     let layers = columns * rows;
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-    let image = Image::new(gpu, ImageInfo { purpose, size, layers: Some(layers), format, usage })?;
+    let image = Image::new(gpu, info(purpose, size, Some(layers), format))?;
+    begin(gpu, &image)?;
     let stored = plan.stored;
-    upload(gpu, &image, layers, size, u64::from(size[0]) * texel, |layer, y, count, staging| {
+    upload(gpu, &image, (0, layers), size, u64::from(size[0]) * texel, |layer, y, count, staging| {
         let corner = [layer % columns * size[0], layer / columns * size[1]];
         for z in corner[1] + y..corner[1] + y + count {
             // What sticks out of the field is never read; it repeats the last row and stays short.
@@ -96,27 +121,49 @@ fn paged(
             staging.resize(staging.len() + (size[0] as usize - width) * texel as usize, 0);
         }
     })?;
+    finish(gpu, &image)?;
     Ok(image)
 }
 
-/// Fills all layers band by band and leaves the image ready for sampling. `fill(layer, first row, rows, out)`
+/// As copies write an image.
+const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
+    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+/// As any shader samples it.
+const SAMPLED: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
+    vk::PipelineStageFlags2::ALL_COMMANDS,
+    vk::AccessFlags2::SHADER_SAMPLED_READ,
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+);
+
+/// Makes a new image ready for copies.
+fn begin(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
+    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+    once(gpu, |r| {
+        barriers(gpu, r.commands, &[image.barrier(nothing, WRITTEN)]);
+        Ok(())
+    })
+}
+
+/// Makes a written image ready for sampling.
+fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
+    once(gpu, |r| {
+        barriers(gpu, r.commands, &[image.barrier(WRITTEN, SAMPLED)]);
+        Ok(())
+    })
+}
+
+/// Fills a level of all layers of an image that is ready for copies, band by band. `fill(layer, first row, rows, out)`
 /// appends the rows' bytes.
 fn upload(
     gpu: &Arc<Gpu>,
     image: &Image,
-    layers: u32,
+    (level, layers): (u32, u32),
     size: [u32; 2],
     row_bytes: u64,
     fill: impl Fn(u32, u32, u32, &mut Vec<u8>),
 ) -> Result<()> {
     let band = ((STAGING / row_bytes) as u32).clamp(1, size[1]);
     let mut staging = Buffer::host(gpu, "staging", u64::from(band) * row_bytes, vk::BufferUsageFlags::TRANSFER_SRC)?;
-    use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-    let ready = (Stage::COPY, Access::TRANSFER_WRITE, Layout::TRANSFER_DST_OPTIMAL);
-    once(gpu, |r| {
-        barriers(gpu, r.commands, &[image.barrier((Stage::NONE, Access::NONE, Layout::UNDEFINED), ready)]);
-        Ok(())
-    })?;
     let mut bytes = Vec::new();
     for layer in 0..layers {
         for y in (0..size[1]).step_by(band as usize) {
@@ -128,6 +175,7 @@ fn upload(
                 .image_subresource(
                     vk::ImageSubresourceLayers::default()
                         .aspect_mask(vk::ImageAspectFlags::COLOR)
+                        .mip_level(level)
                         .base_array_layer(layer)
                         .layer_count(1),
                 )
@@ -136,18 +184,13 @@ fn upload(
             once(gpu, |r| {
                 // SAFETY: staging and image outlive the wait in `once`.
                 unsafe {
-                    let layout = Layout::TRANSFER_DST_OPTIMAL;
-                    gpu.raw.cmd_copy_buffer_to_image(r.commands, staging.raw, image.raw, layout, &region);
+                    gpu.raw.cmd_copy_buffer_to_image(r.commands, staging.raw, image.raw, WRITTEN.2, &region);
                 }
                 Ok(())
             })?;
         }
     }
-    once(gpu, |r| {
-        let sampled = (Stage::ALL_COMMANDS, Access::SHADER_SAMPLED_READ, Layout::SHADER_READ_ONLY_OPTIMAL);
-        barriers(gpu, r.commands, &[image.barrier(ready, sampled)]);
-        Ok(())
-    })
+    Ok(())
 }
 
 /// How an image is sampled.
@@ -159,6 +202,8 @@ pub enum Sampling {
     Clamped,
     /// Linear, repeating.
     Repeated,
+    /// Linear, repeating along some axes (x, z) and with the edge texel beyond the edge of others.
+    Along([bool; 2]),
 }
 
 /// A sampler. What uses it has ended when it is dropped.
@@ -179,20 +224,25 @@ impl Drop for Sampler {
 pub fn sampler(gpu: &Arc<Gpu>, sampling: Sampling) -> Result<Sampler> {
     let (filter, mipmap) = match sampling {
         Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),
-        Sampling::Clamped | Sampling::Repeated => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
+        _ => (vk::Filter::LINEAR, vk::SamplerMipmapMode::LINEAR),
     };
-    let (mode, name) = match sampling {
-        Sampling::Texels => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "texel sampler"),
-        Sampling::Clamped => (vk::SamplerAddressMode::CLAMP_TO_EDGE, "clamping sampler"),
-        Sampling::Repeated => (vk::SamplerAddressMode::REPEAT, "repeating sampler"),
+    let (repeats, name) = match sampling {
+        Sampling::Texels => ([false; 2], "texel sampler"),
+        Sampling::Clamped => ([false; 2], "clamping sampler"),
+        Sampling::Repeated => ([true; 2], "repeating sampler"),
+        Sampling::Along(repeats) => (repeats, "overlay sampler"),
     };
+    let [u, v] = repeats.map(|repeats| match repeats {
+        true => vk::SamplerAddressMode::REPEAT,
+        false => vk::SamplerAddressMode::CLAMP_TO_EDGE,
+    });
     let info = vk::SamplerCreateInfo::default()
         .mag_filter(filter)
         .min_filter(filter)
         .mipmap_mode(mipmap)
-        .address_mode_u(mode)
-        .address_mode_v(mode)
-        .address_mode_w(mode)
+        .address_mode_u(u)
+        .address_mode_v(v)
+        .address_mode_w(u)
         .max_lod(vk::LOD_CLAMP_NONE);
     // SAFETY: the device is alive.
     let raw = unsafe { gpu.raw.create_sampler(&info, None) }?;

@@ -237,6 +237,6 @@ mod tests {
         assert_eq!(pieces(&draws, 3), [0..1, 1..2, 2..3, 3..5, 5..8]);
         assert_eq!(pieces(&draws, 6), [0..1, 1..2, 2..3, 3..4, 4..5, 5..6, 6..8]);
         assert_eq!(pieces(&draws, 0), [0..5, 5..8]);
-        assert_eq!(pieces(&[], 3), []);
+        assert!(pieces(&[], 3).is_empty());
     }
 }

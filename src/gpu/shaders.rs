@@ -45,6 +45,7 @@ impl Constants {
     /// What a scene's shaders leave out, in the order of their `constant_id`s.
     pub fn of(plan: &ScenePlan) -> Self {
         let flag = u32::from;
+        let extent = plan.maps.map_or([0.0; 2], |cut| cut.extent).map(|pages| (pages as f32).to_bits());
         Self::new(&[
             flag(plan.coded),
             flag(plan.tiled),
@@ -59,7 +60,10 @@ impl Constants {
             flag(plan.manner.morph == Morph::ByDistance),
             flag(plan.stored.iter().all(|n| n.is_power_of_two())),
             flag(plan.ceiling),
-            plan.ground.map_or(plan.maps.map_or(0, |cut| cut.page_shift), |cut| 32 - cut.root_shift),
+            plan.ground.map_or(0, |cut| 32 - cut.root_shift),
+            extent[0],
+            extent[1],
+            flag(plan.drape.ends),
         ])
     }
 

@@ -76,7 +76,7 @@ impl Terrain {
         let samplers = [
             pages::sampler(gpu, heights)?,
             pages::sampler(gpu, Sampling::Texels)?,
-            pages::sampler(gpu, Sampling::Clamped)?,
+            pages::sampler(gpu, Sampling::Along(plan.drape.repeats()))?,
             pages::sampler(gpu, Sampling::Repeated)?,
             pages::sampler(gpu, heights)?,
         ];

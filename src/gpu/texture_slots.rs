@@ -143,7 +143,7 @@ impl Overlay {
             (None, Some((cut, picture))) => {
                 let texels = bytemuck::cast_slice(picture.as_raw());
                 let picture = Picture { size: picture.dimensions().into(), texels };
-                Parts::Picture(Box::new(PictureMaps::new(field, cut, picture)))
+                Parts::Picture(Box::new(PictureMaps::new(field, cut, plan.drape, picture)))
             }
             (None, None) => Parts::None,
         };

@@ -222,7 +222,7 @@ impl Bounds {
     }
 
     /// What holds for all squares of a level that a rectangle of samples touches.
-    fn covering(&self, level: u32, first: [u32; 2], side: [u32; 2]) -> Square {
+    pub fn covering(&self, level: u32, first: [u32; 2], side: [u32; 2]) -> Square {
         let held = &self.levels[level as usize];
         let [(x, x_count), (z, z_count)] = [0, 1].map(|k| held.touched(k, self.period[k], first[k], side[k]));
         let mut all = Square::NOTHING;

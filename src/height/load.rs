@@ -9,8 +9,8 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Error, Field, archive, asc, bil, folder, geotiff, hgt, known_formats::Known, mosaic::Parts, png, raster::Raster,
-    raw, sidecar, terrain_rgb, text, tiles, usgs_dem,
+    Error, Field, Footprint, archive, asc, bil, folder, geotiff, hgt, known_formats::Known, mosaic::Parts, png,
+    raster::Raster, raw, sidecar, terrain_rgb, text, tiles, usgs_dem,
 };
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
@@ -83,6 +83,8 @@ pub struct Loaded {
     pub sample_type: String,
     /// Whether 16 bits a sample hold every height without loss.
     pub exact_in_16_bit: bool,
+    /// Which part of the file it is, and where that lies.
+    pub footprint: Footprint,
     /// What the user should know, one sentence each.
     pub warnings: Vec<String>,
     /// The files that the heights come from, in the order in which a later one overlies an earlier one.
@@ -186,7 +188,7 @@ pub(super) fn kind_of(path: &Path, options: &Options) -> Result<Kind, Error> {
     with_source(path, |source| source.kind(options))
 }
 
-fn with_source<T>(path: &Path, read: impl FnOnce(&mut Source) -> Result<T, Error>) -> Result<T, Error> {
+pub(super) fn with_source<T>(path: &Path, read: impl FnOnce(&mut Source) -> Result<T, Error>) -> Result<T, Error> {
     let name = path.display().to_string();
     let siblings = |extension: &str| sibling(path, extension);
     let (file, len) = open(path)?;
@@ -208,7 +210,7 @@ fn open(path: &Path) -> Result<(File, u64), Error> {
 const SIBLING_BYTES: u64 = 1 << 20;
 
 /// The file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
-fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
+pub(super) fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
     let mut appended = path.as_os_str().to_owned();
     appended.push(format!(".{extension}"));
     let upper = extension.to_uppercase();

@@ -21,6 +21,7 @@ mod known_formats;
 pub mod level_errors;
 pub mod levels;
 mod load;
+mod located;
 mod metadata;
 mod mosaic;
 mod nodata;
@@ -29,6 +30,7 @@ pub mod progress;
 mod raster;
 mod raw;
 mod replace;
+mod rounding;
 pub mod rtin;
 mod sample;
 pub mod save;
@@ -51,10 +53,11 @@ mod usgs_dem;
 mod wkt;
 mod world_file;
 
-pub use georef::metres_per_degree;
+pub use georef::{Place, Unit, metres_per_degree};
 pub use load::{
     Encoding, HoleFill, Loaded, Options, RawLayout, SourceFile, load, load_all, load_bytes, load_bytes_with,
 };
+pub use located::{Footprint, Located, place_of};
 pub use nodata::number;
 pub use raster::MAX_SIDE;
 pub use sample::{Order, SampleType};

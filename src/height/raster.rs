@@ -5,6 +5,8 @@ use super::{
     affine::Turn,
     georef::Place,
     load::{HoleFill, Loaded, Options},
+    located::Footprint,
+    rounding,
     sidecar::Georeference,
     unplaced,
 };
@@ -68,6 +70,7 @@ impl Raster {
 
     /// Applies the wishes and makes the field.
     pub fn finish(mut self, name: &str, options: &Options) -> Result<Loaded, Error> {
+        let whole = self.size;
         self.rearrange(name, options)?;
         self.make_holes(options);
         let range = self.check_range();
@@ -75,18 +78,23 @@ impl Raster {
         self.samples = self.samples.compacted();
         self.assume_scale(options, range);
         self.to_metres(name, options, range)?;
+        let metres = self.step * self.scale * self.unit;
+        self.warnings.extend(rounding::warning(&self.sample_type, range, metres));
         let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
         let (spacing, origin) = self.lie(name, options)?;
         let tiles = tiles(name, self.size, options)?;
 
         let mut field = Field::new(self.samples, self.size, spacing, self.holes).tiled(tiles);
         field.origin = origin;
-        field.crs = self.place.and_then(|place| place.crs);
+        field.crs = self.place.as_ref().and_then(|place| place.crs.clone());
         if options.hole_fill == HoleFill::Interpolate {
             field = field.without_holes();
         }
-        let Self { format, sample_type, warnings, .. } = self;
-        Ok(Loaded { field, format, sample_type, exact_in_16_bit, warnings, sources: Vec::new() })
+        let Self { format, sample_type, place, warnings, .. } = self;
+        let first = options.crop.map_or([0, 0], |[x, z, ..]| [x, z]);
+        let footprint = Footprint { whole, first, place };
+        let sources = Vec::new();
+        Ok(Loaded { field, format, sample_type, exact_in_16_bit, footprint, warnings, sources })
     }
 
     /// The same values with rows from north to south, columns from west to east, and holes in place of its nodata value.

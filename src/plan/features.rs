@@ -262,9 +262,14 @@ pub const FEATURES: &[Feature] = &[
     },
 ];
 
-/// Bytes of a picture of so many texels.
+/// Bytes of a picture of this size and its mipmap levels.
 pub(super) fn overlay_bytes(size: [u32; 2]) -> u64 {
-    4 * u64::from(size[0]) * u64::from(size[1])
+    (0..mip_levels(size)).map(|level| size.map(|n| u64::from((n >> level).max(1)))).map(|[w, h]| 4 * w * h).sum()
+}
+
+/// Mipmap levels of an image, down to one texel.
+pub fn mip_levels(size: [u32; 2]) -> u32 {
+    size[0].max(size[1]).ilog2() + 1
 }
 
 fn none(_: &ScenePlan, _: &Kept) -> u64 {
@@ -343,10 +348,12 @@ mod tests {
             let reason = left_out.iter().find(is_of_picture).map(|d| d.reason.clone());
             Ok::<_, String>((kept, reason.unwrap_or_default()))
         };
-        let whole = reasons(Some([2048, 1024]), 8 << 20).unwrap();
-        assert_eq!(whole, (vec![("overlay", 8 << 20)], "no picture exceeds the memory for it".to_string()));
-        let (kept, reason) = reasons(Some([2048, 1024]), (8 << 20) - 1).unwrap();
-        assert!(kept[0].0 == "texture maps" && kept[0].1 < 8 << 20 && reason.contains("as a whole"), "{reason}");
+        let bytes = overlay_bytes([2048, 1024]);
+        assert_eq!(bytes, (0..10).map(|level| (8 << 20) >> (2 * level)).sum::<u64>() + 8 + 4);
+        let whole = reasons(Some([2048, 1024]), bytes).unwrap();
+        assert_eq!(whole, (vec![("overlay", bytes)], "no picture exceeds the memory for it".to_string()));
+        let (kept, reason) = reasons(Some([2048, 1024]), bytes - 1).unwrap();
+        assert!(kept[0].0 == "texture maps" && kept[0].1 < bytes && reason.contains("as a whole"), "{reason}");
         assert_eq!(reasons(Some([8192, 16]), 1 << 30).unwrap().0[0].0, "texture maps", "beyond one image");
         assert!(reasons(Some([2048, 1024]), 99_999).unwrap_err().contains("expected at least"));
     }

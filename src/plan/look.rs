@@ -6,6 +6,7 @@ use super::features::overlay_bytes;
 use super::forced::Forced;
 use crate::draw::layout::Frame;
 use crate::height::Field;
+use crate::texture::drape::Drape;
 use crate::view::{Lens, View};
 
 /// What a fragment's colour says.
@@ -58,6 +59,8 @@ pub struct Look {
     /// The most bytes for a picture laid over the field, or for the texels of the ground: what is larger is there in parts,
     /// as fine as a view needs.
     pub texture_bytes: u64,
+    /// Where a picture lies over the field; `None`: over all of it.
+    pub drape: Option<Drape>,
     /// Features that are kept or left out whatever the scene needs.
     pub forced: Forced,
 }
@@ -72,6 +75,7 @@ impl Default for Look {
             detail: false,
             sun_speed: 0.0,
             texture_bytes: 1 << 30,
+            drape: None,
             forced: Forced::default(),
         }
     }
@@ -81,6 +85,11 @@ impl Look {
     /// Whether a picture of so many texels is within its bytes.
     pub fn holds(&self, size: [u32; 2]) -> bool {
         overlay_bytes(size) <= self.texture_bytes
+    }
+
+    /// The place of a picture over a field.
+    pub fn drape_over(&self, field: &Field) -> Drape {
+        self.drape.unwrap_or_else(|| Drape::over(field))
     }
 
     /// The look so many seconds later.
@@ -102,6 +111,7 @@ impl Look {
             Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
         };
         let placing = Frame::placing(field, view);
+        let overlay = self.drape_over(field).shares(placing.anchor);
         let repeats = |k: usize| Repeats::new(placing.anchor[k], field.spacing[k]);
         Frame {
             height_range: range,
@@ -110,6 +120,10 @@ impl Look {
             fog_density: self.fog as f32,
             detail_first: [0, 1].map(|k| repeats(k).first),
             detail_scale: [0, 1].map(|k| repeats(k).scale),
+            overlay_first: overlay.first,
+            overlay_scale: overlay.scale,
+            overlay_period: overlay.period,
+            overlay_start: overlay.start,
             pixel_slope: slope as f32,
             pixel_size: size as f32,
             ..placing

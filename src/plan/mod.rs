@@ -7,9 +7,10 @@ mod look;
 
 use crate::draw::{Draws, Hiding, Manner};
 use crate::height::{Field, Samples};
+use crate::texture::drape::Drape;
 use crate::texture::ground_maps::GroundCut;
 use crate::texture::picture_maps::Cut;
-pub use features::{FEATURES, Feature};
+pub use features::{FEATURES, Feature, mip_levels};
 pub use forced::Forced;
 pub use look::{Colour, Look};
 
@@ -61,6 +62,8 @@ pub struct ScenePlan {
     pub overlay: Option<[u32; 2]>,
     /// How it is cut where it is there in parts.
     pub maps: Option<Cut>,
+    /// Where it lies over the field.
+    pub drape: Drape,
     /// How texels of the ground are kept, if they are asked for.
     pub ground: Option<GroundCut>,
     /// What was kept and left out by hand.
@@ -121,6 +124,7 @@ impl ScenePlan {
             stored,
             overlay: None,
             maps: None,
+            drape: look.drape_over(field),
             ground: None,
             forced: look.forced,
         };
@@ -188,8 +192,7 @@ impl ScenePlan {
         self.overlay = overlay;
         let is_whole = |size: &[u32; 2]| look.holds(*size) && size.iter().all(|&n| n <= device.image_side);
         if let Some(size) = overlay.filter(|size| field.land().is_none() && !is_whole(size)) {
-            let last = field.size().map(|n| n - 1);
-            self.maps = Some(Cut::new(last, size, look.texture_bytes, device.image_layers)?);
+            self.maps = Some(Cut::new(size, self.drape.repeats(), look.texture_bytes, device.image_layers)?);
         }
         Ok(self)
     }

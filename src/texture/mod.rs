@@ -2,13 +2,16 @@
 //! a frame needs, how fine, and texels for it.
 
 pub mod detail;
+pub mod drape;
 pub mod ground;
 pub mod ground_maps;
 pub mod hidden;
 pub mod mip_spheres;
+pub mod mipmaps;
 pub mod node_table;
 mod noise;
 pub mod page_maps;
+pub mod picture_bounds;
 pub mod picture_maps;
 pub mod pieces;
 pub mod resolution;

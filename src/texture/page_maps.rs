@@ -173,24 +173,26 @@ fn mixed(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
 }
 
 /// Linear light by code (IEC 61966-2-1).
-static LINEAR: std::sync::LazyLock<[f32; 256]> = std::sync::LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        let c = code as f32 / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    })
-});
+static LINEAR: std::sync::LazyLock<[f32; 256]> =
+    std::sync::LazyLock::new(|| std::array::from_fn(|code| light(code as f32 / 255.0)));
 
-fn linear([r, g, b, a]: Texel) -> [f32; 4] {
+fn light(c: f32) -> f32 {
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Linear light, and opacity.
+pub(super) fn linear([r, g, b, a]: Texel) -> [f32; 4] {
     let light = |code: u8| LINEAR[usize::from(code)];
     [light(r), light(g), light(b), f32::from(a) / 255.0]
 }
 
+/// Light halfway between a code and the next one, by code.
+static HALFWAY: std::sync::LazyLock<[f32; 255]> =
+    std::sync::LazyLock::new(|| std::array::from_fn(|code| light((code as f32 + 0.5) / 255.0)));
+
 /// The nearest codes.
-fn coded([r, g, b, a]: [f32; 4]) -> Texel {
-    let code = |light: f32| {
-        let c = if light <= 0.0031308 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        (c * 255.0).round() as u8
-    };
+pub(super) fn coded([r, g, b, a]: [f32; 4]) -> Texel {
+    let code = |light: f32| HALFWAY.partition_point(|end| *end <= light) as u8;
     [code(r), code(g), code(b), (a * 255.0).round() as u8]
 }
 

@@ -6,27 +6,27 @@
 //! meanwhile ([`Slots`]). Where the paper has maps of many sizes, a coarser map here is a tile of the same size over twice
 //! as many pages along each axis: the same texels, and any slot takes any tile. A page's table entry says which slot, and
 //! how many pages the tile in it is long.
+//!
+//! Pages are squares of the picture's texels, wherever the picture lies over the field ([`Drape`]).
 
 use std::fmt;
 use std::sync::Arc;
 
-use glam::DVec3;
-
+use super::drape::Drape;
 use super::page_maps::{Layout, PageMaps, Picture};
+use super::picture_bounds::PictureBounds;
 use super::slots::{Fill, Slots};
 use super::working_set::Node;
 use crate::height::Field;
-use crate::height::bounds::{Bounds, Measure};
-use crate::height::progress::Progress;
-use crate::view::{Aabb, Containment, Frustum, Lens, View};
+use crate::view::{Frustum, View};
 
 /// How a picture is cut, and how much of it is kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
-    /// Samples along a side of a page, as a power of two.
-    pub page_shift: u32,
     /// Pages along (x, z).
     pub pages: [u32; 2],
+    /// Length of the picture's sides in pages: less than `pages` where the last ones stick out.
+    pub extent: [f64; 2],
     /// Cells between the texels along a side of a tile: a power of two.
     pub cells: u32,
     /// A tile of the root is 2^depth pages long.
@@ -39,28 +39,26 @@ pub struct Cut {
 const LEAST_CELLS: u32 = 128;
 /// The most: those of [`PageMaps`].
 const MOST_CELLS: u32 = 4096;
-/// The least samples along a side of a page, as a power of two: those of [`Bounds`].
-const LEAST_SHIFT: u32 = 3;
 /// Tiles that serve for others of a frame: the root, and one that gives way to what it stands in for.
 const SPARE: u32 = 2;
 /// The least tiles kept: a root with all four in it.
 const LEAST_SLOTS: u64 = 5 + SPARE as u64;
 
 impl Cut {
-    /// Cuts a picture of so many texels over a field that ends with sample `last`, for a number of bytes and at most
-    /// `most_slots` tiles.
+    /// Cuts a picture of `picture` texels for a number of bytes and at most `most_slots` tiles. `repeats`: along this axis
+    /// it goes on from its start where it ends, and so has whole pages.
     ///
     /// # Errors
-    /// If the bytes do not hold the few tiles that there must be.
-    pub fn new(last: [u32; 2], picture: [u32; 2], budget_bytes: u64, most_slots: u32) -> Result<Self, String> {
+    /// If the bytes do not hold the smallest number of tiles.
+    pub fn new(picture: [u32; 2], repeats: [bool; 2], budget_bytes: u64, most_slots: u32) -> Result<Self, String> {
         let cut = |cells: u32| {
-            let texels_a_sample = (0..2).map(|k| f64::from(picture[k]) / f64::from(last[k].max(1))).fold(0.0, f64::max);
-            let shift = (f64::from(cells) / texels_a_sample).log2().floor().clamp(f64::from(LEAST_SHIFT), 24.0) as u32;
-            let pages = last.map(|n| n.max(1).div_ceil(1 << shift));
-            // As `PageMaps` rounds them.
-            let needed = (texels_a_sample * f64::from(1u32 << shift)).ceil().clamp(1.0, f64::from(MOST_CELLS));
+            let pages = picture.map(|n| n.div_ceil(cells));
+            let extent = [0, 1].map(|k| match repeats[k] {
+                true => f64::from(pages[k]),
+                false => f64::from(picture[k]) / f64::from(cells),
+            });
             let depth = pages[0].max(pages[1]).next_power_of_two().ilog2();
-            Self { page_shift: shift, pages, cells: (needed as u32).next_power_of_two(), depth, slots: 0 }
+            Self { pages, extent, cells, depth, slots: 0 }
         };
         let sizes = (LEAST_CELLS.ilog2()..=MOST_CELLS.ilog2()).map(|shift| cut(1 << shift));
         let whole = sizes.into_iter().find(|cut| cut.depth <= cut.cells.ilog2());
@@ -110,32 +108,20 @@ impl fmt::Display for Figures {
 pub struct PictureMaps {
     cut: Cut,
     slots: Slots,
-    land: Land,
+    bounds: PictureBounds,
     table: Vec<u32>,
     texel_px: f64,
 }
 
-/// Where the field lies, and how high.
-struct Land {
-    origin: [f64; 2],
-    spacing: [f64; 2],
-    last: [u32; 2],
-    bounds: Bounds,
-    /// Heights over it where it has a ceiling.
-    top: f32,
-}
-
 impl PictureMaps {
-    /// Filters a picture of RGBA texels, row by row, over a field with samples.
-    pub fn new(field: &Field, cut: Cut, picture: Picture) -> Self {
-        let last = field.size().map(|n| n - 1);
-        let extent = last.map(|n| f64::from(n.max(1)) / f64::from(1u32 << cut.page_shift));
-        let maps = PageMaps::new(picture, Layout { pages: cut.pages, extent, repeats: [false; 2] });
+    /// Filters a picture of RGBA texels, row by row, that lies over a field with samples.
+    pub fn new(field: &Field, cut: Cut, drape: Drape, picture: Picture) -> Self {
+        let Cut { pages, extent, depth, .. } = cut;
+        let maps = PageMaps::new(picture, Layout { pages, extent, repeats: drape.repeats() });
         debug_assert_eq!(maps.side(0), cut.cells + 1);
-        let depth = cut.depth;
         let slots = Slots::new(cut.slots, Arc::new(move |node: Node| maps.tile(depth - node.level, node.at)));
-        let pages = cut.pages[0] as usize * cut.pages[1] as usize;
-        Self { cut, slots, land: Land::new(field, &cut), table: vec![entry(0, depth); pages], texel_px: 1.0 }
+        let table = vec![entry(0, depth); pages[0] as usize * pages[1] as usize];
+        Self { cut, slots, bounds: PictureBounds::new(field, &cut, drape), table, texel_px: 1.0 }
     }
 
     /// How it is cut.
@@ -210,14 +196,9 @@ impl PictureMaps {
         most: usize,
     ) -> Option<()> {
         let up = self.cut.depth - node.level;
-        let Some(bounds) = self.land.bounds(up, node.at, self.cut.page_shift) else { return Some(()) };
-        if frustum.contains(&bounds) == Containment::Outside {
-            return Some(());
-        }
-        let texel_m = self.land.spacing[0].max(self.land.spacing[1]) * f64::from(1u32 << (self.cut.page_shift + up))
-            / f64::from(self.cut.cells);
+        let Some(pixel_m) = self.bounds.pixel_m(up, node.at, view, frustum) else { return Some(()) };
         // Any texel is short enough at last: few slots may not hold the finest tiles around the eye.
-        if up == 0 || texel_px == f64::INFINITY || texel_m <= texel_px * pixel_m(view, &bounds) {
+        if up == 0 || texel_px == f64::INFINITY || self.bounds.texel_m(up) <= texel_px * pixel_m {
             found.push(node);
             return (found.len() <= most).then_some(());
         }
@@ -233,43 +214,13 @@ fn entry(slot: u32, up: u32) -> u32 {
     slot << 4 | up
 }
 
-/// Size of a pixel at the nearest point of a box in front of the near plane, metres.
-fn pixel_m(view: &View, bounds: &Aabb) -> f64 {
-    match view.lens {
-        Lens::Perspective { .. } => bounds.distance(view.eye).max(view.near) / view.focal_px(),
-        Lens::Orthographic { .. } => 1.0 / view.focal_px(),
-    }
-}
-
-impl Land {
-    fn new(field: &Field, cut: &Cut) -> Self {
-        let measure = Measure { cells: 1 << cut.page_shift, growth: 1.0, errors: false, morph: false };
-        Self {
-            origin: field.origin,
-            spacing: field.spacing,
-            last: field.size().map(|n| n - 1),
-            bounds: Bounds::new(field, measure, &Progress::default()),
-            top: field.ceiling().map_or(f32::NEG_INFINITY, |ceiling| ceiling.range()[1]),
-        }
-    }
-
-    /// The box around the land of a tile; `None`: there is none.
-    fn bounds(&self, up: u32, at: [u32; 2], page_shift: u32) -> Option<Aabb> {
-        let [low, high] = self.bounds.square(up, at).range;
-        let corner = |further: u32, y: f32| {
-            let along = |k: usize| f64::from(((at[k] + further) << (page_shift + up)).min(self.last[k]));
-            let [x, z] = [0, 1].map(|k| self.origin[k] + along(k) * self.spacing[k]);
-            DVec3::new(x, f64::from(y), z)
-        };
-        (low <= high).then(|| Aabb { min: corner(0, low), max: corner(1, high.max(self.top)) })
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::height::{Holes, Samples};
-    use crate::view::{Metric, Tolerance};
+    use crate::view::{Lens, Metric, Tolerance};
 
     /// Flat land of 257 × 200 samples a metre apart, its west half higher.
     fn field() -> Field {
@@ -280,8 +231,8 @@ mod tests {
     fn maps(budget_bytes: u64) -> PictureMaps {
         let size = [4096, 3184];
         let texels = (0..size[0] * size[1]).map(|k: u32| k.wrapping_mul(0x9e37_79b1).to_le_bytes()).collect::<Vec<_>>();
-        let cut = Cut::new([256, 199], size, budget_bytes, 2048).unwrap();
-        PictureMaps::new(&field(), cut, Picture { size, texels: &texels })
+        let cut = Cut::new(size, [false; 2], budget_bytes, 2048).unwrap();
+        PictureMaps::new(&field(), cut, Drape::over(&field()), Picture { size, texels: &texels })
     }
 
     /// From a place 1.7 m above the ground, or from above.
@@ -310,20 +261,19 @@ mod tests {
 
     #[test]
     fn a_cut_is_as_fine_as_its_picture() {
-        for (last, picture) in
-            [([1024, 1024], [2048, 2048]), ([5000, 300], [16_384, 1000]), ([64, 64], [20_000, 9]), ([9, 9], [3, 2])]
+        for (picture, repeats) in
+            [([2048, 2048], true), ([16_384, 1000], false), ([20_000, 9], true), ([14_000, 14_000], false)]
         {
-            let cut = Cut::new(last, picture, 1 << 40, 2048).unwrap();
-            let side = 1u32 << cut.page_shift;
+            let cut = Cut::new(picture, [repeats; 2], 1 << 40, 2048).unwrap();
             for k in 0..2 {
-                assert!(u64::from(cut.pages[k]) * u64::from(side) >= u64::from(last[k]));
-                let needed = f64::from(picture[k]) / f64::from(last[k]) * f64::from(side);
-                assert!(f64::from(cut.cells) >= needed, "{needed} texels a page, {cut:?}");
-                assert!(cut.pages[k] <= 1 << cut.depth);
+                let texels_a_page = f64::from(picture[k]) / cut.extent[k];
+                assert!(f64::from(cut.cells) >= texels_a_page, "{texels_a_page} texels a page, {cut:?}");
+                assert!(f64::from(cut.pages[k]) >= cut.extent[k] && cut.pages[k] <= 1 << cut.depth);
+                assert!(!repeats || f64::from(cut.pages[k]) == cut.extent[k]);
             }
             assert!(cut.depth <= cut.cells.ilog2() && cut.bytes() == 2048 * cut.tile_bytes());
         }
-        let refused = Cut::new([1024, 1024], [2048, 2048], 100_000, 2048).unwrap_err();
+        let refused = Cut::new([2048, 2048], [false; 2], 100_000, 2048).unwrap_err();
         assert!(refused.contains("expected at least 1 MB"), "{refused}");
     }
 
@@ -337,15 +287,12 @@ mod tests {
             let (mut fine, mut coarse) = (0, 0);
             for (k, entry) in maps.table().iter().enumerate() {
                 let page = [k as u32 % cut.pages[0], k as u32 / cut.pages[0]];
-                let (level, bounds) = (entry & 15, maps.land.bounds(0, page, cut.page_shift).unwrap());
-                if view.frustum().contains(&bounds) == Containment::Outside {
-                    continue;
-                }
-                let texel = |level: u32| f64::from(1u32 << (cut.page_shift + level)) / f64::from(cut.cells);
-                assert!(level == 0 || texel(level) <= pixel_m(&view, &bounds), "page {page:?}: {level}");
+                let (level, frustum) = (entry & 15, view.frustum());
+                let Some(pixel_m) = maps.bounds.pixel_m(0, page, &view, &frustum) else { continue };
+                assert!(level == 0 || maps.bounds.texel_m(level) <= pixel_m, "page {page:?}: {level}");
                 *(if level == 0 { &mut fine } else { &mut coarse }) += 1;
-                let around = maps.land.bounds(level + 1, page.map(|n| n >> (level + 1)), cut.page_shift);
-                let is_too_fine = around.is_some_and(|b| level < cut.depth && texel(level + 1) <= pixel_m(&view, &b));
+                let around = maps.bounds.pixel_m(level + 1, page.map(|n| n >> (level + 1)), &view, &frustum);
+                let is_too_fine = around.is_some_and(|px| level < cut.depth && maps.bounds.texel_m(level + 1) <= px);
                 assert!(!is_too_fine, "page {page:?}: {level}");
             }
             assert!(fine + coarse > 10, "{fine} pages with their own maps, {coarse} with coarser ones");
@@ -392,25 +339,8 @@ mod tests {
     #[test]
     fn few_slots_come_to_rest_within_the_range_of_heights() {
         let mut maps = maps(500_000);
-        let inside = view(128.0, 20.0, -5.0);
-        let (bounds, most) = (
-            |up: u32| maps.land.bounds(up, [127 >> (maps.cut.page_shift + up), 7 >> up], maps.cut.page_shift),
-            maps.cut.slots - SPARE,
-        );
-        assert!((0..=maps.cut.depth).all(|up| bounds(up).is_some_and(|bounds| bounds.distance(inside.eye) == 0.0)));
+        let most = maps.cut.slots - SPARE;
         assert!(3 * maps.cut.depth + 1 > most, "{most} slots, {} levels", maps.cut.depth);
-        settled(&mut maps, &inside);
-    }
-
-    #[test]
-    fn land_without_samples_needs_nothing() {
-        let heights = vec![0.0; 257 * 200];
-        let mut holes = Holes::none(257 * 200);
-        (0..257 * 200).filter(|k| k % 257 < 200).for_each(|k| holes.insert(k));
-        let field = Field::new(Samples::F32(heights), [257, 200], [1.0; 2], holes);
-        let cut = Cut::new([256, 199], [4096, 3184], 1 << 28, 2048).unwrap();
-        let land = Land::new(&field, &cut);
-        assert!(land.bounds(0, [0, 0], cut.page_shift).is_none());
-        assert!(land.bounds(0, [cut.pages[0] - 1, 0], cut.page_shift).is_some());
+        settled(&mut maps, &view(128.0, 20.0, -5.0));
     }
 }

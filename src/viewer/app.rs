@@ -123,14 +123,14 @@ impl<'a> App<'a> {
         let now = Instant::now();
         let dt = self.last_frame.replace(now).map(|last| (now - last).as_secs_f64());
         let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
-        self.session.advance(self.setup, &motion, &open.stage.figures, dt.unwrap_or(0.0));
+        self.session.advance(&motion, &open.stage.figures, dt.unwrap_or(0.0));
         let time_s = self.started.elapsed().as_secs_f64();
         let view = View { time_s, ..self.session.view(self.setup, size) };
         let Session { look, frozen, wants_copy, .. } = self.session;
         let scale = open.window.scale_factor() as f32;
         let overlay = |figures: &Figures| {
             let content = Content {
-                rows: self.session.rows(self.setup, figures),
+                rows: self.session.rows(figures),
                 help: self.session.helps.then_some(self.bindings.as_slice()),
                 // A screenshot does not tell of the one before.
                 note: self.session.note().filter(|_| !wants_copy),

@@ -17,7 +17,7 @@ pub enum Action {
     Fast,
     /// The camera turns with the mouse.
     Look,
-    /// The camera's speed changes (its distance, in orbit).
+    /// The camera's speed changes; in orbit its distance, and the width of an orthographic picture.
     Speed,
     /// The next way to move: fly, orbit, walk.
     Camera,
@@ -95,7 +95,7 @@ pub fn table() -> Vec<Binding> {
         moves(KeyCode::KeyQ, None, "down", DVec3::NEG_Y),
         row(&[At(KeyCode::ShiftLeft), At(KeyCode::ShiftRight)], "faster", A::Fast),
         row(&[Drag], "look around", A::Look),
-        row(&[Wheel], "speed; distance in orbit", A::Speed),
+        row(&[Wheel], "speed; distance in orbit; width with --ortho", A::Speed),
         row(&[Named(NamedKey::Tab)], "camera: fly, orbit, walk", A::Camera),
         row(&[Named(NamedKey::Home)], "back to the start", A::Home),
     ];

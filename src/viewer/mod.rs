@@ -5,6 +5,7 @@ pub mod bindings;
 pub mod camera;
 pub mod hud;
 mod session;
+pub mod site;
 mod stage;
 pub mod times;
 

@@ -7,6 +7,7 @@ use super::Setup;
 use super::bindings::Action;
 use super::camera::{Camera, Motion};
 use super::hud::Row;
+use super::site::Site;
 use super::stage::Figures;
 use super::times::Smoothed;
 use crate::lod::budget::{Controller, RANGE_PX, Target};
@@ -21,6 +22,8 @@ const NOTE: Duration = Duration::from_secs(4);
 pub struct Session {
     /// The camera.
     pub camera: Camera,
+    /// The terrain under it.
+    site: Site,
     /// How the land looks.
     pub look: Look,
     /// The technique.
@@ -61,6 +64,7 @@ impl Session {
     pub fn new(setup: &Setup) -> Self {
         Self {
             camera: Camera::of(&setup.view),
+            site: Site::new(&setup.field),
             look: setup.look,
             technique: setup.technique.clone(),
             frozen: false,
@@ -81,7 +85,7 @@ impl Session {
     pub fn perform(&mut self, setup: &Setup, action: Action) -> Request {
         match action {
             Action::Move(_) | Action::Fast | Action::Look | Action::Speed => {}
-            Action::Camera => self.camera.next_mode(&setup.field),
+            Action::Camera => self.camera.next_mode(&self.site),
             Action::Home => self.camera = Camera::of(&setup.view),
             Action::Technique(k) => return self.take(setup, &TECHNIQUES[k], None),
             Action::Variant => {
@@ -129,8 +133,8 @@ impl Session {
     }
 
     /// Moves the camera, and takes the last frame's figures. After a break `dt` is 0: there was no frame.
-    pub fn advance(&mut self, setup: &Setup, motion: &Motion, figures: &Figures, dt: f64) {
-        self.camera.advance(&setup.field, motion, dt);
+    pub fn advance(&mut self, motion: &Motion, figures: &Figures, dt: f64) {
+        self.camera.advance(&self.site, motion, dt);
         if dt == 0.0 {
             return;
         }
@@ -155,15 +159,7 @@ impl Session {
 
     /// The view of a frame.
     pub fn view(&self, setup: &Setup, size: [u32; 2]) -> View {
-        let above = self.camera.above_ground(&setup.field);
-        View {
-            eye: self.camera.eye,
-            world_from_eye: self.camera.world_from_eye(),
-            size,
-            near: setup.near.unwrap_or((above.abs() / 1000.0).max(0.1)),
-            tolerance: self.tolerance,
-            ..setup.view
-        }
+        View { size, tolerance: self.tolerance, ..self.camera.seen(&self.site, &setup.view, setup.near) }
     }
 
     /// The technique as it is written on the command line.
@@ -197,7 +193,7 @@ impl Session {
     }
 
     /// The numbers over the picture.
-    pub fn rows(&self, setup: &Setup, figures: &Figures) -> Vec<Row> {
+    pub fn rows(&self, figures: &Figures) -> Vec<Row> {
         if !self.shows_numbers {
             return Vec::new();
         }
@@ -207,6 +203,9 @@ impl Session {
         let [x, y, z] = self.camera.eye.to_array();
         let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
         let frozen = if self.frozen { ", frozen" } else { "" };
+        // To a hundredth of the terrain at least.
+        let digits = (2.0 - self.site.diagonal().log10()).ceil().clamp(0.0, 9.0) as usize;
+        let wide = self.camera.width().map(|width| format!(", {} wide", length_text(width))).unwrap_or_default();
         let wire = if self.look.wireframe { ", edges" } else { "" };
         let mut rows = vec![
             row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
@@ -220,9 +219,12 @@ impl Session {
                 format!("{:.2} px {metric}{}{}", self.tolerance.px, self.held(), widened(figures.widening)),
             ),
             row("colours", format!("{}{wire}", colour_name(self.look.colour))),
-            row("camera", format!("{}, {}", self.camera.mode_name(), speed_text(self.camera.speed(&setup.field)))),
-            row("position", format!("{x:.0} {y:.0} {z:.0} m")),
-            row("above ground", format!("{:.1} m", self.camera.above_ground(&setup.field))),
+            row(
+                "camera",
+                format!("{}, {}/s{wide}", self.camera.mode_name(), length_text(self.camera.speed(&self.site))),
+            ),
+            row("position", format!("{x:.digits$} {y:.digits$} {z:.digits$} m")),
+            row("above ground", length_text(self.camera.above_ground(&self.site))),
         ];
         rows.extend(figures.maps.map(|maps| row("texels", maps.to_string())));
         rows
@@ -286,8 +288,13 @@ fn colour_name(colour: Colour) -> &'static str {
     }
 }
 
-fn speed_text(speed: f64) -> String {
-    if speed < 10.0 { format!("{speed:.1} m/s") } else { format!("{speed:.0} m/s") }
+/// Metres with about two digits.
+fn length_text(metres: f64) -> String {
+    match metres.abs() {
+        size if size >= 10.0 => format!("{metres:.0} m"),
+        size if size >= 0.1 || size == 0.0 => format!("{metres:.1} m"),
+        _ => format!("{metres:.1e} m"),
+    }
 }
 
 /// Digits in threes.

@@ -2,6 +2,8 @@
 
 mod endless;
 mod numbers;
+#[cfg(feature = "vulkan")]
+mod overlays;
 mod robust;
 mod several;
 mod watchdog;

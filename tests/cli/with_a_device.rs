@@ -3,7 +3,7 @@
 use super::*;
 
 /// Whether there is a device; without one, says so.
-pub fn has_device() -> bool {
+pub(super) fn has_device() -> bool {
     let output = cuesta(folder().path(), &["info", "--devices", "--json"]);
     let found = code(&output) == 0 && stdout(&output).contains("\"usable\": true");
     assert!(found || std::env::var("REQUIRE_GPU").as_deref() != Ok("1"), "no device");

@@ -120,13 +120,13 @@ fn quiet() -> Common {
 
 /// Reads the field, and selects in the view if that is soon done.
 fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: Option<&LookArgs>) {
-    look.map(|look| told(look.build(&LAND.1)));
-    let Some((entry, settings)) = told(technique.settings()) else { return };
     let Some(loaded) =
         told(ReadArgs { no_cache: true, ..reading.clone() }.load(&quiet(), std::slice::from_ref(&LAND.1)))
     else {
         return;
     };
+    look.map(|look| told(look.build(&quiet(), &LAND.1, (&loaded.field, &loaded.footprint))));
+    let Some((entry, settings)) = told(technique.settings()) else { return };
     let field: Arc<Field> = Arc::new(loaded.field);
     let Some(view) = told(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else { return };
     let [w, h] = field.size().map(u64::from);

@@ -15,6 +15,7 @@ mod loss;
 mod maps;
 mod memory;
 mod neck;
+mod overlay;
 mod painter;
 mod parts;
 mod plan;

@@ -21,10 +21,10 @@ struct Viewer<'a> {
 }
 
 impl<'a> Viewer<'a> {
-    fn open(display: &'a Display) -> Self {
+    fn open(display: &'a Display, terrain: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
-        command.args(["view", "demo", "--size", "320x240", "--tolerance", "2", "--validate", "--json"]);
+        command.arg("view").args(terrain).args(["--size", "320x240", "--tolerance", "2", "--validate", "--json"]);
         // Should a key be lost, it still ends.
         command.args(["--seconds", "600"]).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut program = display.on(&mut command).spawn().expect("the program starts");
@@ -114,7 +114,7 @@ fn on_display(test: impl FnOnce(&Display)) {
 #[test]
 fn a_session_at_the_window() {
     on_display(|display| {
-        let viewer = Viewer::open(display);
+        let viewer = Viewer::open(display, &["demo"]);
         numbers_and_help(&viewer);
         let start = viewer.shoot();
         assert!(brightness(&start, [0.6, 0.0, 0.4, 0.1]) > 180.0, "sky above");
@@ -229,6 +229,60 @@ fn end(viewer: Viewer) {
     assert!(summary["frames"].as_u64() > Some(30), "{summary}");
     assert!(summary["frame_ms"]["p99"].as_f64() >= summary["frame_ms"]["p50"].as_f64(), "{summary}");
     assert!(!told.contains("validation"), "{told}");
+}
+
+/// Share of the pixels that are not the sky's.
+fn land(picture: &RgbImage) -> f64 {
+    let sky = picture.get_pixel(picture.width() - 1, 0);
+    let differs = |p: &&image::Rgb<u8>| p.0.iter().zip(sky.0).any(|(x, y)| x.abs_diff(y) > 12);
+    picture.pixels().filter(differs).count() as f64 / f64::from(picture.width() * picture.height())
+}
+
+/// Terrain of a hand's width, from all sides: the camera stays in sight of it.
+#[test]
+fn a_session_over_millimetres() {
+    on_display(|display| {
+        let model = ["--spacing", "0.005", "--height-scale", "0.0002", "--crop", "100,100,65,65"];
+        let viewer = Viewer::open(display, &[&["demo"], &model[..]].concat());
+        let start = viewer.after("u");
+        assert!(land(&start) > 0.1, "{} of it is land", land(&start));
+        for camera in ["fly", "orbit", "walk"] {
+            for key in ["w", "d", "s", "Shift+s"] {
+                viewer.hold(key, Duration::from_millis(500));
+            }
+            let seen = viewer.shoot();
+            assert!(land(&seen) > 0.01 && difference(&start, &seen) > 0.02, "{camera}: {} is land", land(&seen));
+            viewer.press("Tab");
+        }
+        assert_eq!(difference(&start, &viewer.after("Home")), 0.0, "home again");
+        end(viewer);
+    });
+}
+
+/// Backwards and far out: an orthographic picture becomes wider, and closer again.
+#[test]
+fn an_orthographic_session() {
+    on_display(|display| {
+        let viewer = Viewer::open(display, &["demo", "--ortho", "15000"]);
+        let start = viewer.after("u");
+        viewer.display.act("keydown Shift_L");
+        viewer.hold("s", Duration::from_millis(2500));
+        viewer.display.act("keyup Shift_L");
+        let wide = viewer.shoot();
+        assert!(land(&wide) > 0.01 && land(&wide) < 0.9 * land(&start), "{} of {}", land(&wide), land(&start));
+        viewer.hold("w", Duration::from_millis(1500));
+        let closer = viewer.shoot();
+        assert!(land(&closer) > 1.1 * land(&wide), "W: {} after {}", land(&closer), land(&wide));
+        viewer.display.act("mousemove 160 120 click 5 click 5 click 5");
+        let wider = viewer.shoot();
+        assert!(land(&wider) < land(&closer), "wheel: {} after {}", land(&wider), land(&closer));
+        viewer.press("Tab");
+        viewer.hold("a", Duration::from_millis(800));
+        let orbited = viewer.shoot();
+        assert!(land(&orbited) > 0.01 && difference(&wider, &orbited) > 0.01, "orbit: {}", land(&orbited));
+        assert_eq!(difference(&start, &viewer.after("Home")), 0.0, "home again");
+        end(viewer);
+    });
 }
 
 #[test]

@@ -1,0 +1,114 @@
+//! The picture laid over a field: read from its file, and placed.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use image::ImageDecoder;
+
+use super::{Common, report};
+use crate::height::{Error, Field, Footprint, Located, Place, demo, place_of};
+use crate::texture::drape::Drape;
+
+/// The most texels of a picture, as of samples by default.
+const MOST_TEXELS: u64 = 1 << 30;
+
+/// A picture, north up, and where its file says that it lies.
+pub struct Picture {
+    /// The texels.
+    pub image: image::RgbaImage,
+    file: String,
+    located: Option<Located>,
+}
+
+impl Picture {
+    /// Reads a picture of any supported format, however large, within 2^30 texels.
+    pub fn read(path: &str) -> Result<Self> {
+        let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
+        let reader =
+            image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;
+        let mut decoder = reader.into_decoder().map_err(|e| fail(&e))?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > MOST_TEXELS {
+            return Err(fail(&format!("expected at most 2^30 texels, found {width}x{height}")).into());
+        }
+        // The texels are counted: bytes need no limit of their own.
+        decoder.set_limits(image::Limits::no_limits()).map_err(|e| fail(&e))?;
+        let mut image = image::DynamicImage::from_decoder(decoder).map_err(|e| fail(&e))?.into_rgba8();
+        let located = place_of(Path::new(path), [width, height]);
+        if let Some(Located { transposed, flip, .. }) = &located {
+            if *transposed {
+                image = image::imageops::rotate90(&image);
+                image::imageops::flip_horizontal_in_place(&mut image);
+            }
+            if flip[0] {
+                image::imageops::flip_horizontal_in_place(&mut image);
+            }
+            if flip[1] {
+                image::imageops::flip_vertical_in_place(&mut image);
+            }
+        }
+        Ok(Self { image, file: path.to_string(), located })
+    }
+
+    /// The picture of the embedded terrain.
+    pub fn demo() -> Result<Self> {
+        let image = image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8();
+        Ok(Self { image, file: "demo".to_string(), located: None })
+    }
+
+    /// The place of the picture over a field.
+    ///
+    /// # Errors
+    /// If picture and field are of different coordinate systems.
+    pub fn drape(&self, common: &Common, field: &Field, footprint: &Footprint) -> Result<Drape> {
+        let stretched = match footprint.whole {
+            [0, _] | [_, 0] => Drape::over(field),
+            whole => Drape::of_part(field, footprint.first, whole),
+        };
+        let Some(located) = &self.located else { return Ok(stretched) };
+        let warn = |text: &str| report::warn(common, &format!("{}: {text}", self.file));
+        located.warnings.iter().for_each(|warning| warn(warning));
+        let Some(place) = &footprint.place else {
+            warn("it says where it lies, but the terrain does not: it is laid over all of it");
+            return Ok(stretched);
+        };
+        if let Some(text) = self.mismatch(&located.place, place)? {
+            warn(&text);
+        }
+        let drape = placed(&located.place, self.image.dimensions().into(), place, field);
+        let last = field.stored().map(|n| f64::from(n - 1));
+        if (0..2).any(|k| drape.first[k] >= last[k] || drape.first[k] + drape.length[k] <= 0.0) {
+            warn("it lies beside the terrain: nothing of it is seen");
+        }
+        Ok(drape)
+    }
+
+    /// What is to be said of the coordinate systems of picture and terrain.
+    fn mismatch(&self, picture: &Place, terrain: &Place) -> Result<Option<String>> {
+        // The vertical part of a compound system is the terrain's alone.
+        let horizontal = |place: &Place| place.crs.as_ref().map(|crs| crs.split('+').next().unwrap_or(crs).to_string());
+        let (Some(own), Some(other)) = (horizontal(picture), horizontal(terrain)) else { return Ok(None) };
+        let is_code = |crs: &str| crs.starts_with("EPSG:");
+        match own == other {
+            true => Ok(None),
+            false if is_code(&own) && is_code(&other) => {
+                bail!("{}: coordinate system: expected the terrain's, {other}, found {own}", self.file)
+            }
+            false => {
+                Ok(Some(format!("its coordinate system is named {own}, the terrain's {other}: taken as the same")))
+            }
+        }
+    }
+}
+
+/// The place of a located picture, in samples of a located field. Texels and samples lie on the middle of their cells.
+fn placed(picture: &Place, size: [u32; 2], terrain: &Place, field: &Field) -> Drape {
+    let east = picture.origin[0] - picture.step[0] / 2.0 - terrain.origin[0];
+    let south = terrain.origin[1] - (picture.origin[1] + picture.step[1] / 2.0);
+    Drape {
+        first: [east / terrain.step[0], south / terrain.step[1]],
+        length: [0, 1].map(|k| f64::from(size[k]) * picture.step[k] / terrain.step[k]),
+        period: Drape::period_of(field),
+        ends: true,
+    }
+}

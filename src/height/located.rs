@@ -1,0 +1,56 @@
+//! Position of a field and of a picture in their coordinate system, to lay one over the other.
+
+use std::path::Path;
+
+use tiff::decoder::Decoder;
+
+use super::{
+    Samples, geokeys,
+    georef::Place,
+    load::{self, Options, Source},
+    raster::Raster,
+    sidecar::{self, Georeference},
+};
+
+/// The part of a file that a field is, and its position.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Footprint {
+    /// Samples of the whole file (x, z).
+    pub whole: [u32; 2],
+    /// The field's first sample in it.
+    pub first: [u32; 2],
+    /// Place of that sample, if the file states one.
+    pub place: Option<Place>,
+}
+
+/// Position of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Located {
+    /// Place of its north-west texel's centre once turned, and length of a texel.
+    pub place: Place,
+    /// The file's rows are columns.
+    pub transposed: bool,
+    /// Once transposed, columns run west and rows north.
+    pub flip: [bool; 2],
+    /// Sentences for the user.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the position of a picture of this size: from its GeoTIFF tags, `.aux.xml`, world file and `.prj`, as of heights.
+/// `None` if none of them states it.
+pub fn place_of(path: &Path, size: [u32; 2]) -> Option<Located> {
+    load::with_source(path, |source| Ok(located(source, size))).ok()?
+}
+
+fn located(source: &mut Source, size: [u32; 2]) -> Option<Located> {
+    let mut raster = Raster::new("picture", "u8", size, Samples::F32(Vec::new()));
+    if let Ok(mut decoder) = Decoder::new(&mut source.reader) {
+        let (affine, crs) = geokeys::read(&mut decoder, &mut raster.warnings);
+        raster.georeference = Georeference { affine, crs, ..Georeference::default() };
+    }
+    // Its values are colours, whose unit does not matter.
+    let options = Options { height_scale: Some(1.0), ..Options::default() };
+    sidecar::settle(source, &options, &mut raster);
+    let Raster { place, turn, warnings, .. } = raster;
+    Some(Located { place: place?, transposed: turn.transposed, flip: turn.flip, warnings })
+}
