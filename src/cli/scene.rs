@@ -12,9 +12,7 @@ use super::overlay::Picture;
 use super::whole::Whole;
 use super::{Common, endless, report, several};
 use crate::height::cave::Cave;
-use crate::height::{
-    Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes,
-};
+use crate::height::{Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes};
 use crate::lod::{self, Settings, Technique};
 use crate::plan::{Colour, Forced, Look};
 use crate::view::{Lens, Metric, Tolerance, View, default_near};

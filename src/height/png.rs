@@ -77,7 +77,9 @@ pub(super) fn colours(name: &str, reader: impl load::Input, options: &Options) -
     let mut decoder = checked(reader);
     let header = decoder.read_header_info().map_err(error)?;
     let (w, h, depth) = (header.width, header.height, header.bit_depth);
-    let count = load::samples(name, [w, h].map(u64::from), options)?;
+    // Servers send a picture of one pixel where there is nothing.
+    load::samples(name, [w, h].map(|n| u64::from(n.max(2))), options)?;
+    let count = w as usize * h as usize;
     if depth == BitDepth::Sixteen {
         return Err(Error::new(name, "picture", "expected 8 bits a channel, found 16"));
     }

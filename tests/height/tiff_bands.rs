@@ -10,6 +10,11 @@ fn load(bytes: &[u8], options: &Options) -> Result<Loaded, String> {
     load_bytes("bands.tif", bytes, options).map_err(|e| e.to_string())
 }
 
+/// Options that state a spacing, so that nothing is assumed.
+fn placed() -> Options {
+    Options { spacing: Some([1.0; 2]), ..Options::default() }
+}
+
 /// Every way to lay out several bands.
 fn layouts(file: &TiffFile) -> impl Iterator<Item = TiffFile> {
     (0..8).map(|layout| TiffFile {
@@ -32,7 +37,7 @@ fn each_band_by_its_number() {
             let short = |value: f64| if bits < 16 { value % 250.0 } else { value };
             let bytes = file.bytes(|i, j| short(value(i / bands, j, i % bands)));
             for band in 0..bands {
-                let options = Options { band: Some(band as u32 + 1), ..Options::default() };
+                let options = Options { band: Some(band as u32 + 1), ..placed() };
                 let loaded = load(&bytes, &options).unwrap();
                 for (i, j) in [(0, 0), (36, 22), (17, 9), (15, 16)] {
                     assert_eq!(
@@ -43,7 +48,7 @@ fn each_band_by_its_number() {
                 }
                 assert_eq!(loaded.warnings, Vec::<String>::new());
             }
-            let first = load(&bytes, &Options::default()).unwrap();
+            let first = load(&bytes, &placed()).unwrap();
             assert_eq!(f64::from(first.field.height(17, 9)), short(value(17, 9, 0)));
             let words = format!("{bands} bands; heights are band 1 (--band");
             assert!(matches!(&first.warnings[..], [warning] if warning.contains(&words)), "{:?}", first.warnings);
@@ -84,7 +89,7 @@ fn opacity_of_0_is_a_hole() {
             for file in layouts(&file.tag(338, Tag::Short(vec![kind]))) {
                 let opacity = |i: usize| if (3..8).contains(&i) { 0.0 } else { 100.0 };
                 let bytes = file.bytes(|i, j| if i % 2 == 0 { (i / 2 + j) as f64 } else { opacity(i / 2) });
-                let loaded = load(&bytes, &Options::default()).unwrap();
+                let loaded = load(&bytes, &placed()).unwrap();
                 assert_eq!(loaded.field.holes().count(), 5 * 23, "{file:?}");
                 assert!(loaded.field.is_hole(3, 0) && !loaded.field.is_hole(8, 22) && loaded.warnings.is_empty());
             }
@@ -107,7 +112,7 @@ fn internal_masks() {
                 let next = next.bytes(|i, j| if kind == 4 { clear(i, j) } else { 0.0 });
                 bytes = chained(&bytes, &next);
             }
-            let loaded = load(&bytes, &Options::default()).unwrap();
+            let loaded = load(&bytes, &placed()).unwrap();
             assert_eq!(loaded.field.holes().count(), 12, "{file:?}");
             assert!(loaded.field.is_hole(4, 0) && loaded.field.is_hole(7, 2) && !loaded.field.is_hole(8, 2));
             assert_eq!(loaded.field.statistics().min, 0.0);
@@ -129,7 +134,7 @@ fn a_circle_of_directories_ends() {
     let entries = usize::from(u16::from_le_bytes(bytes[second as usize..second as usize + 2].try_into().unwrap()));
     let at = second as usize + 2 + 12 * entries;
     bytes[at..at + 4].copy_from_slice(&back.to_le_bytes());
-    assert_eq!(load(&bytes, &Options::default()).unwrap().field.height(1, 0), 1.0);
+    assert_eq!(load(&bytes, &placed()).unwrap().field.height(1, 0), 1.0);
 }
 
 #[test]

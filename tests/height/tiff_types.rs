@@ -15,6 +15,11 @@ fn expected(value: impl Fn(usize, usize) -> f64) -> Vec<f32> {
     (0..SIZE[1]).flat_map(|j| (0..SIZE[0]).map(|i| value(i, j) as f32).collect::<Vec<_>>()).collect()
 }
 
+/// Options that state a spacing, so that nothing is assumed.
+fn placed() -> Options {
+    Options { spacing: Some([1.0; 2]), ..Options::default() }
+}
+
 /// Every layout of a width: strips and tiles, three compressions, chunky and planar; the first of two bands is read.
 fn check(file: &TiffFile, name: &str, value: impl Fn(usize, usize) -> f64) {
     for compression in [NONE, LZW, DEFLATE, ZSTD] {
@@ -27,7 +32,7 @@ fn check(file: &TiffFile, name: &str, value: impl Fn(usize, usize) -> f64) {
                 ..file.clone()
             };
             let bytes = file.bytes(|i, j| if i % file.bands == 0 { value(i / file.bands, j) } else { 1.0 });
-            let loaded = load_bytes("width.tif", &bytes, &Options::default()).unwrap();
+            let loaded = load_bytes("width.tif", &bytes, &placed()).unwrap();
             assert_eq!(heights(&loaded.field), expected(&value), "{file:?}");
             assert_eq!(loaded.sample_type, name, "{file:?}");
         }
@@ -99,7 +104,7 @@ fn floats_of_24_bits() {
                 let data = SIZE[0] * SIZE[1] * 3;
                 bytes[8..8 + data].chunks_exact_mut(3).for_each(<[u8]>::reverse);
             }
-            let loaded = load_bytes("float24.tif", &bytes, &Options::default()).unwrap();
+            let loaded = load_bytes("float24.tif", &bytes, &placed()).unwrap();
             assert_eq!((loaded.field.height(0, 0), loaded.field.height(1, 0)), (height, 1.0), "{pattern:#x}");
             assert_eq!(loaded.sample_type, "f24");
         }
@@ -118,7 +123,7 @@ fn bits_from_the_lowest_on() {
         let mut bytes = file.bytes(value);
         let directory = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
         bytes[8..directory].iter_mut().for_each(|byte| *byte = byte.reverse_bits());
-        let loaded = load_bytes("reversed.tif", &bytes, &Options::default()).unwrap();
+        let loaded = load_bytes("reversed.tif", &bytes, &placed()).unwrap();
         assert_eq!(heights(&loaded.field), expected(value));
     }
 }

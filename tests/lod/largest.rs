@@ -13,7 +13,10 @@ use glam::DVec3;
 /// Near the last corner, looking out of the field and down, and then in, near the first corner, and over the middle.
 fn views(field: &Field) -> Vec<View> {
     let last = field.size().map(|n| f64::from(n - 1));
-    let at = |share: f64, above_m: f64| field.world_at(share * last[0], share * last[1], 40.0 + above_m);
+    let at = |share: f64, above_m: f64| {
+        let [i, j] = last.map(|n| (share * n) as u32);
+        field.world(i, j) + DVec3::Y * above_m
+    };
     let view = |eye: DVec3, yaw: f64, pitch: f64| View {
         eye,
         world_from_eye: View::turned(yaw, pitch, 0.0),
