@@ -20,6 +20,10 @@ pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Fields with fewer stored samples are measured in a moment: nothing is kept.
 pub(crate) const KEPT_FROM: u64 = 1 << 23;
 
+/// Tiled fields with holes are measured whole up to this many samples: only so it is known of each square whether it has
+/// land, where their end cuts a period or a period is cut into squares.
+const WHOLE_UP_TO: u64 = 1 << 22;
+
 /// What is to be measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Measure {
@@ -93,11 +97,13 @@ impl Bounds {
     /// Measures a field, in parallel, or finds what was kept when it was measured before.
     pub fn new(field: &Field, measure: Measure, progress: &Progress) -> Self {
         let (stored, size) = (field.stored(), field.size());
-        let period = [0, 1].map(|k| (size[k] > stored[k]).then_some(stored[k]));
+        let samples = |size: [u32; 2]| size.iter().map(|&n| u64::from(n)).product::<u64>();
+        let is_whole = field.holes().count() > 0 && samples(size) <= WHOLE_UP_TO;
+        let period = [0, 1].map(|k| (size[k] > stored[k] && !is_whole).then_some(stored[k]));
         let mut bounds = Self { measure, last: size.map(|n| n - 1), period, levels: Vec::new(), cuts: Vec::new() };
         bounds.lay_out(size[0].max(size[1]) - 1);
         bounds.cuts.resize(bounds.levels.len(), 0.0);
-        let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
+        let is_large = samples(stored) >= KEPT_FROM;
         let kept = is_large.then(|| Kept::new(field, &measure.name())).flatten();
         if kept.as_ref().and_then(Kept::read).is_some_and(|content| bounds.fill(&content)) {
             return bounds;
@@ -105,7 +111,7 @@ impl Bounds {
         // A level takes about as long as another: all its squares look at all samples.
         progress.expect(bounds.levels.iter().map(|level| level.samples()).sum());
         (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level, progress));
-        if measure.errors {
+        if measure.errors && period != [None; 2] {
             let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
             bounds.cuts = cuts::errors(field, measure, bounds.levels(), low.abs().max(high.abs()));
         }
