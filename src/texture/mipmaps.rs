@@ -76,12 +76,12 @@ mod tests {
     #[test]
     fn a_chequered_picture_becomes_grey() {
         for size in [[64, 64], [61, 37], [3, 5], [2, 1]] {
-            let colour = |k: u32| if (k % size[0] + k / size[0]) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+            let colour = |k: u32| if (k % size[0] + k / size[0]).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
             let mut level = (size, (0..size[0] * size[1]).map(colour).collect::<Vec<Texel>>());
             level = halved(Picture { size: level.0, texels: &level.1 });
             assert_eq!(level.0, size.map(|n| (n / 2).max(1)));
             // Where three texels become one, two of them may be white.
-            let slack = if size[0] % 2 == 0 { 0 } else { 35 };
+            let slack = if size[0].is_multiple_of(2) { 0 } else { 35 };
             assert!(
                 level.1.iter().all(|t| t[0].abs_diff(188) <= slack && t[3] == 255),
                 "{size:?}: {:?}",

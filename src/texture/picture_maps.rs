@@ -265,11 +265,11 @@ mod tests {
             [([2048, 2048], true), ([16_384, 1000], false), ([20_000, 9], true), ([14_000, 14_000], false)]
         {
             let cut = Cut::new(picture, [repeats; 2], 1 << 40, 2048).unwrap();
-            for k in 0..2 {
-                let texels_a_page = f64::from(picture[k]) / cut.extent[k];
+            for ((texels, extent), pages) in picture.into_iter().zip(cut.extent).zip(cut.pages) {
+                let texels_a_page = f64::from(texels) / extent;
                 assert!(f64::from(cut.cells) >= texels_a_page, "{texels_a_page} texels a page, {cut:?}");
-                assert!(f64::from(cut.pages[k]) >= cut.extent[k] && cut.pages[k] <= 1 << cut.depth);
-                assert!(!repeats || f64::from(cut.pages[k]) == cut.extent[k]);
+                assert!(f64::from(pages) >= extent && pages <= 1 << cut.depth);
+                assert!(!repeats || f64::from(pages) == extent);
             }
             assert!(cut.depth <= cut.cells.ilog2() && cut.bytes() == 2048 * cut.tile_bytes());
         }
