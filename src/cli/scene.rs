@@ -144,7 +144,7 @@ pub struct LookArgs {
     pub overlay: Option<String>,
     /// Device memory for the overlay, or for the texels of `--colour ground`, megabytes: what is larger is there in parts,
     /// finer where they are seen.
-    #[arg(long, value_name = "MB", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "MB", default_value_t = 1100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
     #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>)]
