@@ -237,10 +237,10 @@ mod tests {
         let device = DeviceLimits { image_side: 16_384, image_layers: 2048, filters_heights: true };
         for (stored, shift) in [
             ([16_384, 16_384], 0),
-            ([16_385, 16_385], 10),
+            ([16_385, 16_385], 9),
             ([16_385, 2], 4),
             ([32_768, 32_768], 14),
-            ([40_000, 40_000], 12),
+            ([40_000, 40_000], 13),
             ([131_072, 131_072], 14),
         ] {
             let found = page_shift(stored, &device);
