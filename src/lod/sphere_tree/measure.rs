@@ -99,24 +99,20 @@ impl Measured {
         }
     }
 
-    /// Index, error and ball of a diamond whose children are measured.
+    /// Index, error and ball of a diamond whose children are measured. The ball holds all samples under its wedges, where
+    /// these collapse too: a side's diamond has the balls of the cells that it reaches into.
     fn measure(&self, middle: Place) -> (usize, f32, f32) {
         let index = self.lattice.index(middle).expect("a place of the level");
         let Diamond { ends, apexes } = Diamond::around(middle);
         let centre = self.centre(middle);
         let always_splits = self.lattice.always_splits(middle);
         let sticks_out = self.lattice.sticks_out(middle);
-        let (mut error, mut ball) = (if always_splits { f32::INFINITY } else { 0.0f32 }, 0.0f64);
+        let (mut error, mut ball) = (if always_splits { f32::INFINITY } else { 0.0 }, 0.0f64);
         for apex in apexes.into_iter().filter(|&apex| self.lattice.contains(apex)) {
             let corners = [apex, ends[0], ends[1]];
             ball = corners.map(|at| self.centre(at).distance(centre)).into_iter().fold(ball, f64::max);
-            let Some(triangle) = self.collapsed(corners).filter(|_| !always_splits) else { continue };
-            error = error.max(surface::deviation(&self.field, &triangle));
-            if sticks_out {
-                // Its halves may cover other samples.
-                surface::visit_samples(&triangle, |x, z, _| {
-                    ball = ball.max(self.centre([x as i32, z as i32]).distance(centre));
-                });
+            if !always_splits {
+                error = error.max(self.deviation(corners));
             }
         }
         if error > 0.0 {
@@ -130,16 +126,16 @@ impl Measured {
         (index, error, ((ball * (1.0 + SPARE)) as f32).next_up())
     }
 
-    /// A wedge as it is drawn, facing up; `None` if it collapses.
-    fn collapsed(&self, corners: [Place; 3]) -> Option<surface::Triangle> {
+    /// How far a triangle is from the samples in it, metres; 0 if it collapses.
+    fn deviation(&self, corners: [Place; 3]) -> f32 {
         let [a, b, c] = corners.map(|at| {
             let [x, z] = self.lattice.on_field(at);
             Corner { x, z, y: self.field.height(x as u32, z as u32) }
         });
         match surface::doubled_area(&[a, b, c]) {
-            0 => None,
-            area if area > 0 => Some([a, b, c]),
-            _ => Some([a, c, b]),
+            0 => 0.0,
+            area if area > 0 => surface::deviation(&self.field, &[a, b, c]),
+            _ => surface::deviation(&self.field, &[a, c, b]),
         }
     }
 
@@ -258,10 +254,22 @@ mod tests {
     #[test]
     fn a_ball_holds_every_sample_that_its_wedges_cover() {
         let progress = Progress::default();
-        let measured = Measured::new(field([37, 21]), 1.0, &progress);
+        let mut samples = holds_samples(&Measured::new(field([37, 21]), 1.0, &progress));
         assert_eq!(progress.share(), Some(1.0));
+        // Steep, so that a sample outside its wedge's ball shows, and sticking out by every length.
+        for (w, h) in (20..40).flat_map(|w| [(w, 21), (w, 33), (13, w)]) {
+            let size = [w, h];
+            let heights = (0..w * h).map(|k| if (k * 7919) % 29 == 3 { 900.0 } else { 0.0 }).collect();
+            let spiky = Field::new(Samples::F32(heights), size, [2.0, 3.0], Holes::none((w * h) as usize));
+            samples += holds_samples(&Measured::new(Arc::new(spiky), 1.0, &Progress::default()));
+        }
+        assert!(samples > 5000, "{samples} samples in wedges");
+    }
+
+    /// Holds the samples under every wedge against its ball and error. Returns how many there are.
+    fn holds_samples(measured: &Measured) -> usize {
         let mut samples = 0;
-        each(&measured, |known| {
+        each(measured, |known| {
             let Diamond { ends, apexes } = Diamond::around(known.at);
             for apex in apexes.into_iter().filter(|&at| measured.lattice.contains(at)) {
                 let mut corners = [apex, ends[0], ends[1]].map(|at| {
@@ -281,6 +289,6 @@ mod tests {
                 }
             }
         });
-        assert!(samples > 5000, "{samples} samples in wedges");
+        samples
     }
 }

@@ -53,7 +53,7 @@ impl SweepCase {
     }
 
     /// Holds the case against every invariant. Returns the first that fails; a panic is a failure.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub fn check(&self) -> Result<(), Box<Failure>> {
         match self.entry() {
             Ok(entry) => self.check_with(entry),
             Err(why) => Err(self.fails("it can be prepared", Broken::new(("the case's view", self.scene().1), why))),
@@ -61,7 +61,7 @@ impl SweepCase {
     }
 
     /// The same with another row in place of the technique's.
-    pub fn check_with(&self, entry: &Entry) -> Result<(), Failure> {
+    pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];
         match catch_unwind(AssertUnwindSafe(|| self.keeps_laws(entry, &field, &views))) {
@@ -70,8 +70,8 @@ impl SweepCase {
         }
     }
 
-    fn fails(&self, law: &'static str, broken: Broken) -> Failure {
-        Failure { case: self.clone(), law, broken }
+    fn fails(&self, law: &'static str, broken: Broken) -> Box<Failure> {
+        Box::new(Failure { case: self.clone(), law, broken })
     }
 
     fn keeps_laws(

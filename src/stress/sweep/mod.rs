@@ -1,6 +1,6 @@
 //! The random sweep: every technique on random terrain, in random settings and views, held against every invariant.
 //!
-//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`LAWS`] ([`case`]). One that
+//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`LAWS`](super::laws::LAWS) ([`case`]). One that
 //! fails is made smaller as long as it fails in the same way ([`shrink`]), and is printed as one line of JSON that runs
 //! again anywhere.
 
@@ -46,7 +46,7 @@ impl std::fmt::Display for Failure {
 
 /// Runs cases on all cores. Returns the failures in order, the first few of them shrunk.
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
-    let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).collect();
+    let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).map(|failure| *failure).collect();
     let few = failures.len().min(MAX_SHRUNK);
     failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone(), SweepCase::check));
     failures

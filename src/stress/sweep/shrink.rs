@@ -9,7 +9,7 @@ use super::viewpoint::{CaseLens, Direction, Viewpoint};
 const MAX_TRIES: usize = 400;
 
 /// The simplest failure of the same invariant that is found by changing one thing at a time.
-pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Failure>) -> Failure {
+pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Box<Failure>>) -> Failure {
     let mut tries = 0;
     loop {
         let fails = |case: SweepCase| check(&case).err().filter(|other| other.law == failure.law);
@@ -18,7 +18,7 @@ pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Fai
             fails(case)
         });
         match smaller {
-            Some(smaller) => failure = smaller,
+            Some(smaller) => failure = *smaller,
             None => return failure,
         }
     }
