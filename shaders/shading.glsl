@@ -109,9 +109,7 @@ vec3 normal_at(vec3 relative, vec2 lattice) {
 // From 0 at the lowest sample to 1 at the highest.
 float share_of_range(float height) {
     float low = frame.height_range.x, high = frame.height_range.y;
-    // What is flat has no range but that of rounding.
-    float least = 1e-6 * max(frame.spacing.x, max(abs(low), abs(high)));
-    return clamp((height - low) / max(high - low, least), 0.0, 1.0);
+    return clamp((height - low) / (high - low), 0.0, 1.0);
 }
 
 // Hypsometric tint: green lowland, ochre slopes, grey rock, snow.

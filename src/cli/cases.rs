@@ -129,7 +129,7 @@ fn asked(common: &Common, name: &str, choices: &[(String, String)]) -> Result<Ve
         all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
     }
     let checked = |own: Vec<(String, String)>| {
-        let settings = super::scene::settings(entry, variant, &own)?;
+        let settings = super::technique::settings(entry, variant, &own)?;
         report::warn_of_idle(common, entry, &settings);
         Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
     };

@@ -11,7 +11,8 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::json;
 
-use super::scene::{TechniqueArgs, TerrainArgs, ViewArgs};
+use super::scene::{TerrainArgs, ViewArgs};
+use super::technique::TechniqueArgs;
 use super::{Common, Outcome, report};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
@@ -65,6 +66,7 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     let mut technique = args.technique.build(common, &field)?;
     let mut list = DrawList::default();
     technique.select(&view, &mut list);
+    report::warn_of_tolerance(common, list.widening);
     let mut mesh = MeshBuilder::new(&field, list.fraction_bits);
     let frame = Frame::placing(&field, &view);
     expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));

@@ -7,7 +7,8 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde::Serialize;
 
-use super::scene::{LookArgs, ReadArgs, TechniqueArgs, ViewArgs};
+use super::scene::{LookArgs, ReadArgs, ViewArgs};
+use super::technique::TechniqueArgs;
 use super::{Common, Outcome, plan, report, working_set};
 use crate::height::{Loaded, SourceFile};
 

@@ -19,6 +19,7 @@ pub mod scene;
 mod several;
 pub mod stress;
 pub mod synth;
+pub mod technique;
 #[cfg(feature = "viewer")]
 pub mod view;
 pub mod whole;

@@ -17,7 +17,7 @@ pub struct Picture {
     /// The texels.
     pub image: image::RgbaImage,
     file: String,
-    located: Option<Located>,
+    located: Located,
 }
 
 impl Picture {
@@ -34,18 +34,16 @@ impl Picture {
         // The texels are counted: bytes need no limit of their own.
         decoder.set_limits(image::Limits::no_limits()).map_err(|e| fail(&e))?;
         let mut image = image::DynamicImage::from_decoder(decoder).map_err(|e| fail(&e))?.into_rgba8();
-        let located = place_of(Path::new(path), [width, height]);
-        if let Some(Located { transposed, flip, .. }) = &located {
-            if *transposed {
-                image = image::imageops::rotate90(&image);
-                image::imageops::flip_horizontal_in_place(&mut image);
-            }
-            if flip[0] {
-                image::imageops::flip_horizontal_in_place(&mut image);
-            }
-            if flip[1] {
-                image::imageops::flip_vertical_in_place(&mut image);
-            }
+        let located = place_of(Path::new(path), [width, height])?;
+        if located.transposed {
+            image = image::imageops::rotate90(&image);
+            image::imageops::flip_horizontal_in_place(&mut image);
+        }
+        if located.flip[0] {
+            image::imageops::flip_horizontal_in_place(&mut image);
+        }
+        if located.flip[1] {
+            image::imageops::flip_vertical_in_place(&mut image);
         }
         Ok(Self { image, file: path.to_string(), located })
     }
@@ -53,7 +51,7 @@ impl Picture {
     /// The picture of the embedded terrain.
     pub fn demo() -> Result<Self> {
         let image = image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8();
-        Ok(Self { image, file: "demo".to_string(), located: None })
+        Ok(Self { image, file: "demo".to_string(), located: Located::default() })
     }
 
     /// The place of the picture over a field.
@@ -65,17 +63,17 @@ impl Picture {
             [0, _] | [_, 0] => Drape::over(field),
             whole => Drape::of_part(field, footprint.first, whole),
         };
-        let Some(located) = &self.located else { return Ok(stretched) };
         let warn = |text: &str| report::warn(common, &format!("{}: {text}", self.file));
-        located.warnings.iter().for_each(|warning| warn(warning));
+        self.located.warnings.iter().for_each(|warning| warn(warning));
+        let Some(own) = &self.located.place else { return Ok(stretched) };
         let Some(place) = &footprint.place else {
             warn("it says where it lies, but the terrain does not: it is laid over all of it");
             return Ok(stretched);
         };
-        if let Some(text) = self.mismatch(&located.place, place)? {
+        if let Some(text) = self.mismatch(own, place)? {
             warn(&text);
         }
-        let drape = placed(&located.place, self.image.dimensions().into(), place, field);
+        let drape = placed(own, self.image.dimensions().into(), place, field);
         let last = field.stored().map(|n| f64::from(n - 1));
         if (0..2).any(|k| drape.first[k] >= last[k] || drape.first[k] + drape.length[k] <= 0.0) {
             warn("it lies beside the terrain: nothing of it is seen");

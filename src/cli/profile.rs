@@ -8,7 +8,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::render::open;
-use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
+use super::scene::{LookArgs, TerrainArgs, ViewArgs};
+use super::technique::TechniqueArgs;
 use super::{Common, Outcome, endless, report};
 use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;

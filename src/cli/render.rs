@@ -8,7 +8,8 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
-use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
+use super::scene::{LookArgs, TerrainArgs, ViewArgs};
+use super::technique::TechniqueArgs;
 use super::{Common, Outcome, endless, report};
 use crate::bench::rows::extended;
 use crate::draw::expand;
@@ -153,6 +154,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
     report::save(&args.output, &shot.picture)?;
+    report::warn_of_tolerance(common, shot.list.widening);
     let measured = if args.measure { Some(measure(&scene, technique.as_ref(), &view, &shot)?) } else { None };
     let device = gpu.candidate.name.clone();
     let messages = Gpu::close(gpu);

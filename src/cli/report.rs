@@ -75,6 +75,15 @@ pub fn warn(common: &Common, text: &str) {
     }
 }
 
+/// Warns if a list was made under another tolerance than the view's, by its scale.
+pub fn warn_of_tolerance(common: &Common, scale: f64) {
+    if scale == f64::INFINITY {
+        warn(common, "there is too much to draw in this view: no tolerance is kept (larger blocks or tiles hold more)");
+    } else if scale > 1.0 {
+        warn(common, &format!("there is too much to draw in this view: the tolerance is {scale:.3} times as wide"));
+    }
+}
+
 /// Tells of settings that do nothing beside the others.
 pub fn warn_of_idle(common: &Common, entry: &Entry, settings: &Settings) {
     settings.idle(entry).iter().for_each(|idle| warn(common, &format!("--set {idle}")));

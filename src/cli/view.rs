@@ -6,7 +6,8 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::scene::{LookArgs, TechniqueArgs, TerrainArgs, ViewArgs};
+use super::scene::{LookArgs, TerrainArgs, ViewArgs};
+use super::technique::TechniqueArgs;
 use super::{Common, Outcome, interrupt, render, report};
 use crate::height::Loaded;
 use crate::lod::budget::Target;

@@ -5,7 +5,7 @@ use std::path::Path;
 use tiff::decoder::Decoder;
 
 use super::{
-    Samples, geokeys,
+    Error, Samples, geokeys,
     georef::Place,
     load::{self, Options, Source},
     raster::Raster,
@@ -24,10 +24,10 @@ pub struct Footprint {
 }
 
 /// Position of a picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Located {
-    /// Place of its north-west texel's centre once turned, and length of a texel.
-    pub place: Place,
+    /// Place of its north-west texel's centre once turned, and length of a texel, if the file states them.
+    pub place: Option<Place>,
     /// The file's rows are columns.
     pub transposed: bool,
     /// Once transposed, columns run west and rows north.
@@ -37,12 +37,14 @@ pub struct Located {
 }
 
 /// Reads the position of a picture of this size: from its GeoTIFF tags, `.aux.xml`, world file and `.prj`, as of heights.
-/// `None` if none of them states it.
-pub fn place_of(path: &Path, size: [u32; 2]) -> Option<Located> {
-    load::with_source(path, |source| Ok(located(source, size))).ok()?
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn place_of(path: &Path, size: [u32; 2]) -> Result<Located, Error> {
+    load::with_source(path, |source| Ok(located(source, size)))
 }
 
-fn located(source: &mut Source, size: [u32; 2]) -> Option<Located> {
+fn located(source: &mut Source, size: [u32; 2]) -> Located {
     let mut raster = Raster::new("picture", "u8", size, Samples::F32(Vec::new()));
     if let Ok(mut decoder) = Decoder::new(&mut source.reader) {
         let (affine, crs) = geokeys::read(&mut decoder, &mut raster.warnings);
@@ -51,6 +53,8 @@ fn located(source: &mut Source, size: [u32; 2]) -> Option<Located> {
     // Its values are colours, whose unit does not matter.
     let options = Options { height_scale: Some(1.0), ..Options::default() };
     sidecar::settle(source, &options, &mut raster);
-    let Raster { place, turn, warnings, .. } = raster;
-    Some(Located { place: place?, transposed: turn.transposed, flip: turn.flip, warnings })
+    let Raster { place, turn, mut warnings, .. } = raster;
+    // A guess at the unit does not matter: coordinates without a system are the terrain's.
+    warnings.retain(|warning| !warning.contains("--spacing"));
+    Located { place, transposed: turn.transposed, flip: turn.flip, warnings }
 }

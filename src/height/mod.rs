@@ -16,6 +16,7 @@ mod geokeys;
 mod georef;
 mod geotiff;
 mod hgt;
+mod holes;
 pub(crate) mod kept;
 mod known_formats;
 pub mod level_errors;
@@ -54,6 +55,7 @@ mod wkt;
 mod world_file;
 
 pub use georef::{Place, Unit, metres_per_degree};
+pub use holes::Holes;
 pub use load::{
     Encoding, HoleFill, Loaded, Options, RawLayout, SourceFile, load, load_all, load_bytes, load_bytes_with,
 };
@@ -177,43 +179,6 @@ impl Samples {
         }
         let heights = (0..self.len()).map(|k| (f64::from(self.height(k)) * factor + offset) as f32).collect();
         *self = Samples::F32(heights).compacted();
-    }
-}
-
-/// Samples without data, one bit each.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Holes {
-    words: Vec<u64>,
-    count: u64,
-}
-
-impl Holes {
-    /// No hole among `len` samples.
-    pub fn none(len: usize) -> Self {
-        Self { words: vec![0; len.div_ceil(64)], count: 0 }
-    }
-
-    /// Makes sample `k` a hole.
-    pub fn insert(&mut self, k: usize) {
-        let bit = 1 << (k % 64);
-        self.count += u64::from(self.words[k / 64] & bit == 0);
-        self.words[k / 64] |= bit;
-    }
-
-    /// Whether sample `k` is a hole.
-    #[inline]
-    pub fn contains(&self, k: usize) -> bool {
-        self.words[k / 64] >> (k % 64) & 1 != 0
-    }
-
-    /// One bit a sample.
-    pub fn words(&self) -> &[u64] {
-        &self.words
-    }
-
-    /// How many samples are holes.
-    pub fn count(&self) -> u64 {
-        self.count
     }
 }
 
@@ -348,7 +313,7 @@ impl Field {
     /// Whether sample `(i, j)` has no data.
     #[inline]
     pub fn is_hole(&self, i: u32, j: u32) -> bool {
-        self.holes.count > 0 && self.holes.contains(self.index(i, j))
+        self.holes.count() > 0 && self.holes.contains(self.index(i, j))
     }
 
     /// World position of sample `(i, j)`.
@@ -398,7 +363,7 @@ impl Field {
     pub fn statistics(&self) -> Statistics {
         let (mut min, mut max, mut sum, mut count) = (f32::INFINITY, f32::NEG_INFINITY, 0.0, 0u64);
         for k in 0..self.samples.len() {
-            if self.holes.count == 0 || !self.holes.contains(k) {
+            if self.holes.count() == 0 || !self.holes.contains(k) {
                 let h = self.samples.height(k);
                 (min, max, sum, count) = (min.min(h), max.max(h), sum + f64::from(h), count + 1);
             }
@@ -417,7 +382,7 @@ impl Field {
         for j in 0..h - 1 {
             for i in 0..w - 1 {
                 let corners = [(i, j), (i + 1, j + 1), (i + 1, j), (i, j + 1)];
-                if self.holes.count == 0 || !corners.iter().any(|&(i, j)| self.is_hole(i, j)) {
+                if self.holes.count() == 0 || !corners.iter().any(|&(i, j)| self.is_hole(i, j)) {
                     let [a, d, b, c] = corners.map(|(i, j)| self.height(i, j));
                     largest = largest.max((a + d - b - c).abs() / 2.0);
                 }
@@ -449,7 +414,7 @@ impl Field {
     /// Fills the samples under holes by push-pull: means of the known samples on ever coarser grids, then
     /// each hole takes the value of the finest coarser cell that knows one, bilinearly.
     fn fill_holes(&mut self) {
-        if self.holes.count == 0 {
+        if self.holes.count() == 0 {
             return;
         }
         let [w, h] = self.stored.map(|n| n as usize);

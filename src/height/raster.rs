@@ -207,6 +207,9 @@ impl Raster {
             return Err(Error::new(name, "heights", what));
         }
         let (factor, offset) = metres(self.unit * options.height_scale.unwrap_or(1.0), options.height_offset);
+        if options.height_scale == Some(0.0) {
+            return Err(Error::new(name, "--height-scale", "expected a number other than 0, found 0"));
+        }
         let is_usable = |factor: f64| factor.is_finite() && factor as f32 != 0.0;
         if !is_usable(factor) || range.iter().any(|&value| is_far(value, (factor, offset))) {
             let what = format!("expected heights of at most 1e12 m, found {range:?} times {factor} plus {offset}");
@@ -248,7 +251,10 @@ pub const MAX_SIDE: u32 = 1 << 30;
 /// How often the field repeats.
 fn tiles(name: &str, [w, h]: [u32; 2], options: &Options) -> Result<[u32; 2], Error> {
     let [nx, nz] = options.tiles.unwrap_or([1, 1]);
-    let fits = |n: u32, side: u32| n > 0 && n.checked_mul(side).is_some_and(|n| n <= MAX_SIDE);
+    if nx == 0 || nz == 0 {
+        return Err(Error::new(name, "--tile", format!("expected at least 1 tile each way, found {nx},{nz}")));
+    }
+    let fits = |n: u32, side: u32| n.checked_mul(side).is_some_and(|n| n <= MAX_SIDE);
     match fits(nx, w) && fits(nz, h) {
         true => Ok([nx, nz]),
         false => Err(Error::new(

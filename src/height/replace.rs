@@ -28,7 +28,8 @@ fn begin(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut unfinished = lock();
-    let file = builder.tempfile_in(folder)?;
+    // The error names the temporary file, which does not matter.
+    let file = builder.tempfile_in(folder).map_err(|e| io::Error::new(e.kind(), e.kind().to_string()))?;
     unfinished.push(file.path().to_owned());
     Ok(file)
 }

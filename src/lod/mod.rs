@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Manner, Submission};
 use crate::height::Field;
-use crate::view::{Tolerance, View};
+use crate::view::{Metric, Tolerance, View};
 pub use settings::{Need, Setting, Settings, Values};
 
 /// A way to choose what is drawn.
@@ -165,16 +165,30 @@ pub const TECHNIQUES: &[Entry] = &[
 /// What a tolerance is multiplied by until a list fits.
 const WIDENING: f64 = 1.5;
 
-/// What `select` makes of the view under its tolerance or, where it makes nothing because there is too much, under the first
-/// wider one; and what the tolerance was multiplied by. A wider tolerance never draws more, so that steps may be left out
-/// on the way: what is asked for may be a hundred powers of ten too fine. The last call is that of the answer. Where even the
-/// widest tolerance is too much, as it still keeps what is drawn in front of the eye, it is an infinite one, which keeps nothing.
+/// Retries `select` with a growing tolerance until its list fits. Returns the result and the scale of the tolerance.
+///
+/// A wider tolerance never draws more, so that the search skips steps: the view's tolerance may be a hundred powers of ten
+/// too fine. The last call is that of the result. Under the certified metric terrain stays in front of the eye at any
+/// finite tolerance, which may always be too much: then the scale is infinite, and the paper's metric decides.
 ///
 /// # Panics
 /// If `select` makes nothing under an infinite tolerance.
 pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
+    if let Some(found) = first_that_fits(view, &mut select) {
+        return found;
+    }
+    let under = |tolerance: Tolerance| View { tolerance, ..*view };
+    let paper = under(Tolerance { metric: Metric::Paper, ..view.tolerance });
+    let found = first_that_fits(&paper, &mut select).map(|(selected, _)| selected);
+    let without = under(Tolerance { px: f64::INFINITY, ..view.tolerance });
+    let selected = found.or_else(|| select(&without));
+    (selected.expect("nothing is too much where no tolerance is kept"), f64::INFINITY)
+}
+
+/// The same among finite tolerances of the view's metric; `None` if none fits.
+fn first_that_fits<T>(view: &View, select: &mut impl FnMut(&View) -> Option<T>) -> Option<(T, f64)> {
     if let Some(selected) = select(view) {
-        return (selected, 1.0);
+        return Some((selected, 1.0));
     }
     let factor = |steps: i32| WIDENING.powi(steps);
     let px_at = |steps: i32| (view.tolerance.px.max(f64::MIN_POSITIVE) * factor(steps)).min(f64::MAX);
@@ -185,7 +199,7 @@ pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>
         (below, above) = (above, 2 * above);
         selected = under(px_at(above));
     }
-    let mut is_last = selected.is_some();
+    let mut is_last = true;
     while selected.is_some() && above - below > 1 {
         let middle = below.midpoint(above);
         let finer = under(px_at(middle));
@@ -195,11 +209,9 @@ pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>
             None => below = middle,
         }
     }
-    // Callers keep state: the last call must be that of the answer.
-    match if is_last { selected } else { under(px_at(above)) } {
-        Some(selected) => (selected, factor(above)),
-        None => (under(f64::INFINITY).expect("nothing is too much where no tolerance is kept"), f64::INFINITY),
-    }
+    // Callers keep state: the last call must be that of the result.
+    let selected = if is_last { selected } else { under(px_at(above)) };
+    selected.map(|selected| (selected, factor(above)))
 }
 
 /// The row with this name.
@@ -212,7 +224,7 @@ mod tests {
     use super::*;
     use glam::{DMat3, DVec3};
 
-    use crate::view::{Lens, Metric};
+    use crate::view::Lens;
 
     fn view(px: f64) -> View {
         let tolerance = Tolerance { px, metric: Metric::Certified };

@@ -114,7 +114,7 @@ impl Look {
         let overlay = self.drape_over(field).shares(placing.anchor);
         let repeats = |k: usize| Repeats::new(placing.anchor[k], field.spacing[k]);
         Frame {
-            height_range: range,
+            height_range: tinted_range(field, range),
             lamp_reach: lamp_reach(field, view.eye, range),
             sun: self.towards_sun().as_vec3().to_array(),
             fog_density: self.fog as f32,
@@ -160,6 +160,14 @@ impl Repeats {
         let first = if shift > 0 { anchor.rem_euclid(1 << shift) } else { 0 };
         Self { first: first as f32, scale: 2f32.powi(-shift) }
     }
+}
+
+/// The ends of the tint: the range of heights, or more where that is too little beside the field's length for heights
+/// that are reconstructed in single precision.
+fn tinted_range(field: &Field, [low, high]: [f32; 2]) -> [f32; 2] {
+    let length_m = (0..2).map(|k| f64::from(field.size()[k]) * field.spacing[k]).fold(0.0, f64::max);
+    let least_m = 1e-5 * length_m.min(1e9).max(f64::from(low.abs().max(high.abs())));
+    [low, high.max((f64::from(low) + least_m.max(1e-12)) as f32).max(low.next_up())]
 }
 
 #[cfg(test)]

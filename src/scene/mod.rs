@@ -169,7 +169,15 @@ impl Stage {
         self.list.clear();
         technique.select(view, &mut self.list);
         let (tolerance_scale, search_ms) = (self.list.widening, ms(started));
-        let wider = self.draw_once(technique, &view.under_wider_tolerance(tolerance_scale), copy)?;
+        let wider = if tolerance_scale.is_finite() {
+            self.draw_once(technique, &view.under_wider_tolerance(tolerance_scale), copy)?
+        } else {
+            // No tolerance says what the host selects then.
+            let submission = self.submission.replace(Submission::default());
+            let drawn = self.draw_once(technique, view, copy);
+            self.submission = submission;
+            drawn?
+        };
         self.list.widening = tolerance_scale;
         let frame_ms = times.frame_ms + search_ms + wider.frame_ms;
         Ok(Times { frame_ms, select_ms: times.select_ms + search_ms + wider.select_ms, ..wider })

@@ -46,7 +46,7 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, settings: &[&str], views: &[View]
     for view in views {
         stage.draw(technique.as_mut(), view, Copy::Nothing).unwrap();
         stage.complete().unwrap();
-        assert_eq!(stage.list.submission, Submission::Driven);
+        assert!(stage.list.submission == Submission::Driven || stage.list.widening == f64::INFINITY);
         let mut list = DrawList::default();
         technique.select(view, &mut list);
         assert_eq!(stage.list.widening, list.widening, "the same tolerance: {view:?}");
