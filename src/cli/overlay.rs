@@ -24,6 +24,10 @@ impl Picture {
     /// Reads a picture of any supported format, however large, within 2^30 texels.
     pub fn read(path: &str) -> Result<Self> {
         let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
+        // A pipe would wait for its writer to be opened.
+        if !std::fs::metadata(path).map_err(|e| fail(&e))?.is_file() {
+            return Err(fail(&"expected a file, found a folder or a device").into());
+        }
         let reader =
             image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;
         let mut decoder = reader.into_decoder().map_err(|e| fail(&e))?;

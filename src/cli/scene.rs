@@ -1,7 +1,6 @@
 //! What the command line says about terrain, view, technique and look, turned into the things themselves.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
@@ -13,15 +12,15 @@ use super::whole::Whole;
 use super::{Common, endless, report, several};
 use crate::height::cave::Cave;
 use crate::height::{Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes};
-use crate::lod::{self, Settings, Technique};
+
 use crate::plan::{Colour, Forced, Look};
-use crate::view::{Lens, Metric, Tolerance, View, default_near};
+use crate::view::{Lens, Tolerance, View, default_near};
 
 /// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
 /// a tenth of a millimetre.
 const FARTHEST_M: f64 = 1e12;
 /// The shortest that is asked for, metres, and the finest tolerance, pixels.
-const FINEST: f64 = 1e-9;
+pub(super) const FINEST: f64 = 1e-9;
 
 /// Where heights come from.
 #[derive(Args, Debug, Clone)]

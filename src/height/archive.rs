@@ -11,16 +11,14 @@ use zip::ZipArchive;
 use super::{
     Error,
     folder::{LeftOut, is_companion},
-    load::{self, HEAD_BYTES, Kind, Options, Source},
+    load::{self, HEAD_BYTES, Kind, Options, SIBLING_BYTES, Source},
     mosaic::Parts,
 };
 
 /// The most bytes a member may unpack to; larger files are to be unpacked first.
 const UNPACKED_BYTES: u64 = 1 << 31;
 /// The most members looked at.
-const MEMBERS: usize = 4096;
-/// The most bytes of a text beside a member.
-const SIBLING_BYTES: u64 = 1 << 16;
+const MEMBERS: usize = 1 << 16;
 
 /// Reads the file inside a gzip file, or the height files of a tar file inside it.
 pub(super) fn gather_gzip(source: &mut Source, options: &Options, parts: &mut Parts) -> Result<(), Error> {
@@ -78,7 +76,10 @@ impl<'a> Zip<'a> {
     fn open(name: &'a str, reader: &'a mut dyn load::Input) -> Result<Self, Error> {
         let mut archive = ZipArchive::new(reader).map_err(|e| Error::new(name, "zip directory", e))?;
         let mut list = Vec::new();
-        for index in 0..archive.len().min(MEMBERS) {
+        if archive.len() > MEMBERS {
+            return Err(too_many(name, archive.len()));
+        }
+        for index in 0..archive.len() {
             let member = archive.by_index(index).map_err(|e| Error::new(name, format!("zip member {index}"), e))?;
             if member.is_file() {
                 let name = String::from_utf8_lossy(member.name_raw()).into_owned();
@@ -115,7 +116,10 @@ fn tar_members(name: &str, reader: &mut dyn Read, limit: u64) -> Result<Tar, Err
     let error = |e| Error::new(name, "tar data", e);
     let (mut list, mut bytes, mut left) = (Vec::new(), Vec::new(), limit);
     let mut archive = tar::Archive::new(reader);
-    for entry in archive.entries().map_err(error)?.take(MEMBERS) {
+    for (count, entry) in archive.entries().map_err(error)?.enumerate() {
+        if count == MEMBERS {
+            return Err(too_many(name, count + 1));
+        }
         let mut entry = entry.map_err(error)?;
         let member = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         if !entry.header().entry_type().is_file() {
@@ -123,7 +127,7 @@ fn tar_members(name: &str, reader: &mut dyn Read, limit: u64) -> Result<Tar, Err
         }
         let (len, mut content) = (entry.size(), Vec::new());
         entry.by_ref().take(HEAD_BYTES).read_to_end(&mut content).map_err(error)?;
-        if !matches!(Kind::of(&content, len, false), Kind::Known(_)) {
+        if is_companion(&member) || !matches!(Kind::of(&content, len, false), Kind::Known(_)) {
             let more = if is_companion(&member) { SIBLING_BYTES.min(left) } else { left };
             entry.take(more + 1).read_to_end(&mut content).map_err(error)?;
         }
@@ -178,16 +182,22 @@ fn gather_members(name: &str, members: &mut dyn Members, options: &Options, part
 /// The text beside a member that has another extension: `a.hdr` or `a.bil.hdr`.
 fn sibling(texts: &[(String, Vec<u8>)], member: &str, extension: &str) -> Option<Vec<u8>> {
     let stem = member.rsplit_once('.').map_or(member, |(stem, _)| stem);
-    let is_beside = |other: &str| {
-        let rests = [stem, member].into_iter().filter_map(|stem| other.strip_prefix(stem)?.strip_prefix('.'));
-        other != member && { rests }.any(|rest| rest.eq_ignore_ascii_case(extension))
+    let is_beside = |other: &str, stem: &str| {
+        let rest = other.strip_prefix(stem).and_then(|rest| rest.strip_prefix('.'));
+        other != member && rest.is_some_and(|rest| rest.eq_ignore_ascii_case(extension))
     };
-    texts.iter().find(|(other, _)| is_beside(other)).map(|(_, text)| text.clone())
+    let beside = |stem: &str| texts.iter().find(|(other, _)| is_beside(other, stem));
+    // The name with its own extension is of this file alone.
+    beside(member).or_else(|| beside(stem)).map(|(_, text)| text.clone())
 }
 
 /// No format needs more than 16 bytes a sample, but for texts of unusual length.
 fn limit(options: &Options) -> u64 {
     options.max_samples.saturating_mul(16).clamp(1 << 16, UNPACKED_BYTES)
+}
+
+fn too_many(name: &str, count: usize) -> Error {
+    Error::new(name, "archive", format!("expected at most {MEMBERS} members, found {count} or more: unpack it first"))
 }
 
 fn too_long(name: &str, limit: u64) -> Error {

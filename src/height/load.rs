@@ -195,7 +195,7 @@ pub(super) fn with_source<T>(path: &Path, read: impl FnOnce(&mut Source) -> Resu
     read(&mut Source { name: &name, reader: &mut BufReader::new(file), len, siblings: &siblings })
 }
 
-fn open(path: &Path) -> Result<(File, u64), Error> {
+pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     let error = |e: io::Error| Error::new(path.display().to_string(), "file", format!("expected a readable file, {e}"));
     // A pipe would wait for its writer to be opened.
     if !std::fs::metadata(path).map_err(error)?.is_file() {
@@ -207,14 +207,15 @@ fn open(path: &Path) -> Result<(File, u64), Error> {
 }
 
 /// The most bytes read from a file beside the data: headers and projections are short texts.
-const SIBLING_BYTES: u64 = 1 << 20;
+pub(super) const SIBLING_BYTES: u64 = 1 << 24;
 
 /// The file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
 pub(super) fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
     let mut appended = path.as_os_str().to_owned();
     appended.push(format!(".{extension}"));
     let upper = extension.to_uppercase();
-    [path.with_extension(extension), appended.into(), path.with_extension(upper)]
+    // The name with its own extension is of this file alone.
+    [appended.into(), path.with_extension(extension), path.with_extension(upper)]
         .into_iter()
         .filter(|other| other != path && other.is_file())
         .find_map(|other| {

@@ -13,9 +13,12 @@ use super::{
     terrain_rgb,
 };
 
+/// The most bytes that a byte of Deflate data can become.
+const EXPANSION: u64 = 1032;
+
 /// Reads grey heights row by row; colour pictures go to [`terrain_rgb`].
 pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
-    let name = source.name;
+    let (name, source_len) = (source.name, source.len);
     let error = |place: String, e: DecodingError| Error::new(name, place, e);
     let mut decoder = checked(&mut source.reader);
     let header = decoder.read_header_info().map_err(|e| error("header".to_owned(), e))?;
@@ -35,6 +38,10 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
         }
     };
     let count = load::samples(name, size.map(u64::from), options)?;
+    if source_len.saturating_mul(EXPANSION) < count as u64 * sample.bytes() as u64 {
+        let what = format!("expected data of {} x {} samples, found a file of {source_len} bytes", size[0], size[1]);
+        return Err(Error::new(name, "length", what));
+    }
     let row_bytes = size[0] as usize * sample.bytes() * color.samples();
     // The decoder holds a few rows; the rest of its default limit is for other chunks.
     decoder.set_limits(Limits { bytes: Limits::default().bytes.saturating_add(row_bytes.saturating_mul(8)) });

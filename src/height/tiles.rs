@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
+    fs,
     io::Read,
     path::{Path, PathBuf},
 };
@@ -100,7 +100,7 @@ pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
         for (x, _, x_path) in numbered(&zoom_path)?.into_iter().filter(|(.., path)| path.is_dir()) {
             for (y, double, file) in numbered(&x_path)?.into_iter().filter(|(.., path)| is_picture(path)) {
                 if let Some(tile) = grid.tile_at(zoom, [x, y]) {
-                    levels.entry((zoom, double)).or_default().insert(tile, file);
+                    levels.entry((zoom, double)).or_default().entry(tile).or_insert(file);
                 }
             }
         }
@@ -108,16 +108,22 @@ pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
     Ok((!levels.is_empty()).then_some(Tiles { grid, levels }))
 }
 
-/// Entries of a directory with numbers as names; the flag is true if `@2x` follows the number.
+/// Entries of a directory with numbers as names, in the order of their names; the flag is true if `@2x` follows the
+/// number. Of several files of one number the first counts.
 fn numbered(path: &Path) -> Result<Vec<(u32, bool, PathBuf)>, Error> {
     let entries = fs::read_dir(path).map_err(|e| Error::new(path.display().to_string(), "directory", e))?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     let number = |path: PathBuf| {
         let stem = path.file_stem()?.to_str()?;
         let double = stem.strip_suffix("@2x");
-        Some((double.unwrap_or(stem).parse().ok()?, double.is_some(), path))
+        let digits = double.unwrap_or(stem);
+        // Neither 00 nor +0.
+        let number = digits.parse().ok().filter(|number: &u32| number.to_string() == digits)?;
+        Some((number, double.is_some(), path))
     };
-    Ok(paths.filter_map(number).collect())
+    let mut found: Vec<_> = paths.filter_map(number).collect();
+    found.sort();
+    Ok(found)
 }
 
 fn is_picture(path: &Path) -> bool {
@@ -184,8 +190,7 @@ fn named(text: &str) -> Option<Encoding> {
 /// The bytes of a small file.
 pub(super) fn bytes(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(TILE_BYTES).read_to_end(&mut bytes));
-    read.map_err(|e| Error::new(name, "file", e))?;
+    load::open(path)?.0.take(TILE_BYTES).read_to_end(&mut bytes).map_err(|e| Error::new(name, "file", e))?;
     Ok(bytes)
 }
 

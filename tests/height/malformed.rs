@@ -183,3 +183,15 @@ fn write_seeds() {
         std::fs::write(folder.join(file.name), [vec![wish], bytes, hdr].concat()).unwrap();
     }
 }
+
+/// A header that claims more samples than its file can hold is refused before memory is taken for them.
+#[test]
+fn a_picture_that_claims_too_much_is_refused() {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 32_768, 32_768);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    drop(encoder.write_header().unwrap());
+    let error = cuesta::height::load_bytes("a.png", &bytes, &cuesta::height::Options::default()).unwrap_err();
+    assert!(error.to_string().contains("a.png: length: expected data of 32768 x 32768 samples"), "{error}");
+}

@@ -342,3 +342,32 @@ fn tiles_on_both_sides_of_the_antimeridian_are_neighbours() {
     let origin = field.origin[0] / field.spacing[0] / 1200.0;
     assert!((origin - 179.0).abs() < 1e-9, "{origin}");
 }
+
+/// Members beyond a limit are never left out in silence.
+#[test]
+fn an_archive_of_too_many_members_is_refused() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("many.tar");
+    let mut tar = tar::Builder::new(std::io::BufWriter::new(fs::File::create(&path).unwrap()));
+    for k in 0..=1 << 16 {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(0);
+        tar.append_data(&mut header, format!("{k}.txt"), &[][..]).unwrap();
+    }
+    drop(tar.into_inner().unwrap());
+    let error = load(&path, &Options::default()).unwrap_err().to_string();
+    assert!(error.contains("expected at most 65536 members") && !error.contains('\n'), "{error}");
+}
+
+/// A pipe would be waited for.
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_a_tile_folder_is_refused() {
+    let folder = tempdir().unwrap();
+    fs::create_dir_all(folder.path().join("1/0")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.path().join("1/0/0.png")).status();
+    assert!(made.expect("mkfifo").success());
+    let options = Options { encoding: Some(cuesta::height::Encoding::Mapbox), ..Options::default() };
+    let error = load(folder.path(), &options).unwrap_err().to_string();
+    assert!(error.contains("0.png") && error.contains("neither a file nor a directory"), "{error}");
+}

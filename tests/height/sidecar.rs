@@ -348,3 +348,36 @@ fn grey_pictures_that_state_nothing() {
     one(&load_bytes("u.tif", &unsigned, &Options::default()).unwrap(), &["fifth"]);
     assert!(load_bytes("s.tif", &tiff().bytes(tiny::height), &Options::default()).unwrap().warnings.is_empty());
 }
+
+/// `a.tif.aux.xml` is that of `a.tif`, `a.aux.xml` may be that of another picture; in a folder and in archives alike.
+#[test]
+fn the_file_with_the_whole_name_counts_and_is_read_whole() {
+    let scale = |scale: f64, padding: usize| {
+        let band = format!("<PAMRasterBand band=\"1\"><Scale>{scale}</Scale></PAMRasterBand>");
+        format!("<PAMDataset><Metadata><MDI key=\"K\">{}</MDI></Metadata>{band}</PAMDataset>", " ".repeat(padding))
+    };
+    let tiff = tiff().placed([10.0; 2], [1000.0, 9000.0]).keys(&UTM).bytes(|i, j| tiny::height(i, j));
+    // Longer than the first bytes by which a format is recognised, and than a short text.
+    let files = [
+        ("a.tif", tiff),
+        ("a.aux.xml", scale(10.0, 0).into_bytes()),
+        ("a.tif.aux.xml", scale(2.0, 70_000).into_bytes()),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(folder.path().join("a.zip")).unwrap());
+    let mut tar = tar::Builder::new(std::fs::File::create(folder.path().join("a.tar")).unwrap());
+    for (name, bytes) in &files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut zip, bytes).unwrap();
+        let mut header = tar::Header::new_gnu();
+        header.set_size(bytes.len() as u64);
+        tar.append_data(&mut header, name, &bytes[..]).unwrap();
+    }
+    zip.finish().unwrap();
+    tar.finish().unwrap();
+    for name in ["a.tif", "a.zip", "a.tar"] {
+        let loaded = load(&folder.path().join(name), &Options::default()).unwrap();
+        assert_eq!(f64::from(loaded.field.height(1, 0)), 2.0 * tiny::height(1, 0), "{name}: {:?}", loaded.warnings);
+    }
+}

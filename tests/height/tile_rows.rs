@@ -158,3 +158,11 @@ fn geodetic_and_local_profiles() {
     let error = load(local.path(), &options).unwrap_err().to_string();
     assert!(error.contains("units-per-pixel of order 1"), "{error}");
 }
+
+/// A tile's name is its number as it is written, and of two pictures of one tile the first by name counts.
+#[test]
+fn other_spellings_of_a_number_are_no_tiles() {
+    let tiles = [("1/0/00.png", 9), ("1/0/+0.png", 8), ("1/0/0.png", 1), ("1/0/0.pngraw", 7), ("1/00/0.png", 6)];
+    let loaded = read(&folder(&tiles.map(|(name, code)| (name, tile(4, code, 255)))));
+    assert_eq!((loaded.field.size(), code(&loaded, 0, 0)), ([4, 4], 1));
+}
