@@ -46,8 +46,8 @@ fn every_technique_draws_or_refuses_fields_of_the_largest_side() {
         long([64, 64], [MAX_SIDE; 2]),
         // A last block that the field's end cuts.
         long([63, 61], [MAX_SIDE; 2]),
-        long([64, 16], [MAX_SIDE, 16]),
-        long([16, 64], [16, MAX_SIDE]),
+        long([64, 32], [MAX_SIDE, 32]),
+        long([32, 64], [32, MAX_SIDE]),
         // As large as strips may be.
         long([64, 64], [1 << 22; 2]),
     ];

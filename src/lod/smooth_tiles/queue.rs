@@ -191,7 +191,10 @@ impl Queue {
     }
 }
 
-/// Vertices of a buffer that holds so many chunks of each level, and the pages that refining leaves for what coarsens.
+/// Vertices of a buffer that holds so many chunks of each level, with a page more of each of these levels, and a page of
+/// every level for chunks that give way.
 fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
-    Pool::vertices_for(sizes, chunks) + Pool::vertices_for(sizes, &vec![0; sizes.len()])
+    let unused = chunks.iter().filter(|&&count| count == 0).count();
+    let page = Pool::vertices_for(sizes, &vec![0; sizes.len()]) / sizes.len();
+    Pool::vertices_for(sizes, chunks) + (sizes.len() - unused) * page
 }
