@@ -201,7 +201,7 @@ impl Overlay {
     /// Loads all that a view needs of the list seen last. Nothing may be under way on the device.
     ///
     /// # Errors
-    /// If something is still missing after [`MAX_ROUNDS`] rounds.
+    /// If something is still missing after `MAX_ROUNDS` rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         for _ in 0..MAX_ROUNDS {
             once(gpu, |r| self.look(r, view))?;

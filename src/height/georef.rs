@@ -97,7 +97,7 @@ impl Place {
     /// Distance of neighbouring samples (x, z) on the ground and world position (x, z) of the north-west
     /// sample, metres, for `rows` rows.
     ///
-    /// Angles become metres by [`Ellipsoid::metres_per_radian`] at the middle row. Web Mercator distances shrink by
+    /// Angles become metres by `Ellipsoid::metres_per_radian` at the middle row. Web Mercator distances shrink by
     /// cos φ of the middle row; its origin stays in Mercator metres.
     pub fn spacing_and_origin(&self, rows: u32) -> ([f64; 2], [f64; 2]) {
         let [east, north] = self.origin;

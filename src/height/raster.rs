@@ -77,7 +77,7 @@ impl Raster {
         self.blank_holes(range);
         self.samples = self.samples.compacted();
         self.assume_scale(options, range);
-        self.to_metres(name, options, range)?;
+        self.scale_to_metres(name, options, range)?;
         let metres = self.step * self.scale * self.unit;
         self.warnings.extend(rounding::warning(&self.sample_type, range, metres));
         let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
@@ -195,7 +195,7 @@ impl Raster {
     }
 
     /// Turns values into metres: (value · scale + offset) · unit · `--height-scale` + `--height-offset`.
-    fn to_metres(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
+    fn scale_to_metres(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
         let metres = |unit: f64, shift: f64| (self.step * self.scale * unit, self.offset * unit + shift);
         let is_far = |value: f32, (factor, offset): (f64, f64)| {
             !(0.0..=FARTHEST_M).contains(&(f64::from(value) * factor + offset).abs())

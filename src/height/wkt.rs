@@ -146,7 +146,7 @@ impl Node {
     }
 
     fn vertical(&self) -> Crs {
-        let by_code = || Some(crs::vertical(self.epsg()?)?.height_unit?);
+        let by_code = || crs::vertical(self.epsg()?)?.height_unit;
         let is_down = |label: &String| label == "DOWN";
         let by_axis = self.children.iter().any(|child| child.is(&["AXIS"]) && child.labels.iter().any(is_down));
         // ESRI states the direction as a parameter.

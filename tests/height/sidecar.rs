@@ -356,7 +356,7 @@ fn the_file_with_the_whole_name_counts_and_is_read_whole() {
         let band = format!("<PAMRasterBand band=\"1\"><Scale>{scale}</Scale></PAMRasterBand>");
         format!("<PAMDataset><Metadata><MDI key=\"K\">{}</MDI></Metadata>{band}</PAMDataset>", " ".repeat(padding))
     };
-    let tiff = tiff().placed([10.0; 2], [1000.0, 9000.0]).keys(&UTM).bytes(|i, j| tiny::height(i, j));
+    let tiff = tiff().placed([10.0; 2], [1000.0, 9000.0]).keys(&UTM).bytes(tiny::height);
     // Longer than the first bytes by which a format is recognised, and than a short text.
     let files = [
         ("a.tif", tiff),
