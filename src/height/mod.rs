@@ -87,8 +87,13 @@ pub struct Error {
 impl Error {
     /// An error at a place of a file.
     pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
-        Self { file: file.into(), place: place.into(), what: what.to_string() }
+        Self { file: file.into(), place: place.into(), what: one_line(what.to_string()) }
     }
+}
+
+/// The text with spaces in place of line breaks and other control characters: decoders quote bytes of broken files.
+fn one_line(text: String) -> String {
+    if text.contains(char::is_control) { text.replace(char::is_control, " ") } else { text }
 }
 
 /// Heights as they are kept, row by row from the north-west corner.
