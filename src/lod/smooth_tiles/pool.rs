@@ -62,6 +62,11 @@ impl Pool {
         sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
     }
 
+    /// Vertices of pages that hold so many chunks whatever their levels, with two pages of each level more.
+    pub fn most_vertices(sizes: &[usize], chunks: usize) -> usize {
+        (chunks.div_ceil(CHUNKS) + 3 * sizes.len()) * CHUNKS * sizes[0]
+    }
+
     /// The first vertex of a free slot for a chunk of a level, if pages are left: of the empty ones `spare` are not
     /// touched.
     pub fn take(&mut self, level: u32, spare: usize) -> Option<u32> {

@@ -51,6 +51,7 @@ impl Queue {
         };
         // All of the finest level that is used, twice, so that all may change in one frame; the coarsest at least.
         let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
+        let whole = whole.max(Pool::most_vertices(&sizes, count));
         let least = settled_vertices(&sizes, &all_at(&[top]));
         let mut pool = Pool::new(sizes, whole.min(most_vertices).max(least));
         let first_vertices =
