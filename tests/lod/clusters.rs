@@ -229,12 +229,13 @@ fn no_weights_exceed_the_error() {
     assert!(closest[2..].iter().all(|&share| share > 0.97), "{closest:?} of the error");
 }
 
-/// Straight down on land so steep that it stays in front of the eye under no finite tolerance with few enough blocks.
+/// Straight down on land so steep that it stays in front of the eye under no finite tolerance with few enough blocks: the
+/// paper's metric decides.
 #[test]
-fn where_no_finite_tolerance_fits_the_root_is_drawn() {
+fn where_no_certified_tolerance_fits_the_papers_metric_decides() {
     let field = Arc::new(synth(Kind::Checker, [4097, 1537], 1));
-    let down = |above_m: f64| View {
-        eye: DVec3::new(2048.0, above_m, 768.0),
+    let view = View {
+        eye: DVec3::new(2048.0, 33_000.0, 768.0),
         world_from_eye: View::turned(0.0, -90.0, 0.0),
         lens: Lens::Perspective { fov_x: 1.2 },
         size: [640, 360],
@@ -242,22 +243,18 @@ fn where_no_finite_tolerance_fits_the_root_is_drawn() {
         tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
         time_s: 0.0,
     };
-    let high = f64::from(field.statistics().max);
-    for name in ["clusters", "clusters:draw-per-block", "clusters:gpu-driven"] {
-        for settings in [&["block=8"][..], &["block=8", "morph=on", "seams=skirts"], &["block=8", "morph=distance"]] {
-            let mut technique = technique(&field, name, settings);
-            let mut scales = Vec::new();
-            for above_m in [33_000.0, high + 1000.0, high + 1.0, high - 1.0] {
-                let (view, mut list) = (down(above_m), DrawList::default());
-                technique.select(&view, &mut list);
-                assert!(technique.limits().hold(&list.size()), "{name} {settings:?}, {above_m} m");
-                let proof =
-                    watertight::prove_list(&field, &view, technique.manner().seams, technique.resident(), &list);
-                proof.unwrap_or_else(|why| panic!("{name} {settings:?}, {above_m} m: {why}"));
-                scales.push(list.widening);
-            }
-            println!("{name} {settings:?}: {scales:?}");
-            assert!(scales.contains(&f64::INFINITY), "{name} {settings:?}: {scales:?}");
-        }
+    let forms = [
+        ("clusters", &["block=8"][..]),
+        ("clusters:draw-per-block", &["block=8"]),
+        ("clusters", &["block=8", "morph=on", "seams=skirts"]),
+        ("clusters:gpu-driven", &["block=8", "morph=distance"]),
+    ];
+    for (name, settings) in forms {
+        let mut technique = technique(&field, name, settings);
+        let mut list = DrawList::default();
+        technique.select(&view, &mut list);
+        println!("{name} {settings:?}: {} times as wide, {} triangles", list.widening, list.triangles());
+        assert!(technique.limits().hold(&list.size()), "{name} {settings:?}");
+        assert!(list.widening == f64::INFINITY && list.triangles() > 100, "{name} {settings:?}");
     }
 }
