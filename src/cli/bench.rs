@@ -79,7 +79,7 @@ pub struct MeasureArgs {
     /// Paths to fly; the kit has its own.
     #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = super::cases::path_help())]
     pub path: Vec<String>,
-    /// What a pixel of error means.
+    /// The meaning of a pixel of error.
     #[arg(long, value_enum, default_value_t = Choice::Certified)]
     pub metric: Choice,
     /// Pixels; the kit has its own.

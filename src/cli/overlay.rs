@@ -85,7 +85,7 @@ impl Picture {
         Ok(drape)
     }
 
-    /// What is to be said of the coordinate systems of picture and terrain.
+    /// A warning about the coordinate systems of picture and terrain.
     fn mismatch(&self, picture: &Place, terrain: &Place) -> Result<Option<String>> {
         // The vertical part of a compound system is the terrain's alone.
         let horizontal = |place: &Place| place.crs.as_ref().map(|crs| crs.split('+').next().unwrap_or(crs).to_string());

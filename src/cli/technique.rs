@@ -23,7 +23,7 @@ pub struct TechniqueArgs {
     /// Error allowed, pixels.
     #[arg(long, value_name = "PX", default_value_t = 1.0)]
     pub tolerance: f64,
-    /// What a pixel of error means.
+    /// The meaning of a pixel of error.
     #[arg(long, value_enum, default_value_t = MetricArg::Certified)]
     pub metric: MetricArg,
 }

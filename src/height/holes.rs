@@ -20,7 +20,7 @@ impl Holes {
         self.words[k / 64] |= bit;
     }
 
-    /// Whether sample `k` is a hole.
+    /// Returns true if sample `k` is a hole.
     #[inline]
     pub fn contains(&self, k: usize) -> bool {
         self.words[k / 64] >> (k % 64) & 1 != 0
@@ -31,7 +31,7 @@ impl Holes {
         &self.words
     }
 
-    /// How many samples are holes.
+    /// The number of holes.
     pub fn count(&self) -> u64 {
         self.count
     }

@@ -73,7 +73,7 @@ impl Settings {
         Self { variant: None, values, progress: Progress::default() }
     }
 
-    /// What was set on `entry` and does nothing beside the other settings: a line each.
+    /// The settings on `entry` that do nothing beside the others, a line each.
     pub fn idle(&self, entry: &Entry) -> Vec<String> {
         let is_set = |key: &str| self.values.iter().any(|(s, value)| s.key == key && value != s.default);
         let is_idle = |need: &&Need| is_set(need.key) && !need.words.contains(&self.word(need.other));

@@ -12,7 +12,7 @@ pub struct Drape {
     pub length: [f64; 2],
     /// Samples after which it lies over the field again.
     pub period: [Option<u32>; 2],
-    /// Whether the terrain beyond its sides keeps its own colour. Otherwise its outermost texels go on there.
+    /// True if the terrain beyond its sides keeps its own colour. Otherwise its outermost texels go on there.
     pub ends: bool,
 }
 
@@ -54,7 +54,7 @@ impl Drape {
         [0, 1].map(|k| (field.land().is_none() && size[k] > stored[k]).then_some(stored[k]))
     }
 
-    /// Whether the picture goes on from its start where it ends.
+    /// True if the picture goes on from its start where it ends.
     pub fn repeats(&self) -> [bool; 2] {
         [0, 1].map(|k| self.period[k].is_some_and(|period| f64::from(period) == self.length[k]))
     }
@@ -86,7 +86,7 @@ mod tests {
         Field::new(Samples::F32(vec![0.0; count]), size, [10.0; 2], Holes::none(count))
     }
 
-    /// What the shader computes, in single precision.
+    /// The shader's result, in single precision.
     fn share(drape: &Drape, anchor: [i32; 2], from_anchor: [f32; 2]) -> [f32; 2] {
         let Shares { first, scale, period, start } = drape.shares(anchor);
         [0, 1].map(|k| {

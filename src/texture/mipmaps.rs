@@ -33,7 +33,7 @@ pub fn halved(picture: Picture) -> ([u32; 2], Vec<Texel>) {
     (size, texels.collect())
 }
 
-/// What each of `fewer` texels covers of `count`; the weights add up to 1.
+/// The share of `count` texels that each of `fewer` covers; the weights add up to 1.
 fn covered(count: u32, fewer: u32) -> Vec<Covered> {
     let length = f64::from(count) / f64::from(fewer);
     let of = |n: u32| {

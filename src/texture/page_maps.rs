@@ -28,7 +28,7 @@ pub struct Layout {
     pub pages: [u32; 2],
     /// Pages that the picture's sides are long: fewer than `pages` where the last ones stick out of the field.
     pub extent: [f64; 2],
-    /// Whether the picture goes on from its start where it ends.
+    /// True if the picture goes on from its start where it ends.
     pub repeats: [bool; 2],
 }
 

@@ -69,13 +69,13 @@ fn geotiff(file: &Path, picture: &RgbImage, epsg: u16, corner: [f64; 2], step: f
     image.write_data(picture.as_raw()).unwrap();
 }
 
-/// Whether a pixel has the colour of the sky above the horizon.
+/// Returns true if a pixel has the colour of the sky above the horizon.
 fn is_sky(pixel: &image::Rgba<u8>) -> bool {
     const SKY: [u8; 3] = [207, 222, 239];
     pixel.0.iter().zip(SKY).all(|(a, b)| a.abs_diff(b) <= 3)
 }
 
-/// What lies at a place, metres east and south of the north-west sample, in a picture from [`above`] the middle.
+/// The picture's content at a place, metres east and south of the north-west sample, in a picture from [`above`] the middle.
 fn at(picture: &RgbaImage, east: f64, south: f64) -> &'static str {
     let pixel = picture.get_pixel((east - 300.0 + 360.0) as u32 / 6, (south - 200.0 + 270.0) as u32 / 6).0;
     match pixel {

@@ -41,7 +41,7 @@ fn blocks() -> RgbaImage {
     })
 }
 
-/// From straight above a lattice position, so many pixels a sample.
+/// From straight above a lattice position, at a number of pixels a sample.
 fn above(field: &Field, at: [f64; 2], px: f64) -> View {
     let mut view = aslant(field, SIZE, 0.5);
     view.eye = field.world_at(at[0], at[1], 9000.0);

@@ -307,7 +307,7 @@ fn folders_and_archives_without_heights_say_what_they_hold() {
     assert!(error.contains("inner.zip (an archive)"), "{error}");
 }
 
-/// What OpenTopography sends: a grid and its projection in a .tar.gz.
+/// A download of OpenTopography: a grid and its projection in a .tar.gz.
 #[test]
 fn texts_beside_a_member_are_found_in_archives() {
     let grid = tiny::asc();

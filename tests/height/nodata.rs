@@ -1,4 +1,4 @@
-//! What means "no data": texts of files, and values that are no heights.
+//! The meaning of "no data": texts of files, and values that are no heights.
 
 use cuesta::height::{Loaded, Options, Samples, load_bytes, load_bytes_with};
 

@@ -4,7 +4,7 @@ use cuesta::height::{Field, Holes, Options, Samples, load, load_bytes, load_byte
 
 use super::{real::shared, tiny};
 
-/// What a grid holds and where it lies.
+/// The heights of a grid and its position.
 fn content(text: &[u8]) -> (Samples, Holes, [f64; 2], [f64; 2]) {
     let field = field(text);
     (field.samples().clone(), field.holes().clone(), field.spacing, field.origin)

@@ -68,7 +68,7 @@ fn every_technique_draws_or_refuses_fields_of_the_largest_side() {
             let entry = lod::find(name).expect("in the table");
             let choices: Vec<_> = (!key.is_empty()).then(|| (key.to_owned(), word.to_owned())).into_iter().collect();
             let settings = Settings::new(entry, None, &choices).expect("the table's own values");
-            // A technique that goes through all samples refuses so many.
+            // A technique that goes through all samples refuses these fields.
             let Ok(mut technique) = entry.prepare(&field, &settings) else { continue };
             // Strips take seconds where much land is in sight.
             let views = views(&field);

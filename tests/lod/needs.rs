@@ -1,4 +1,4 @@
-//! What is said to do nothing beside other settings does nothing.
+//! Settings that are listed as idle beside others do nothing.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;

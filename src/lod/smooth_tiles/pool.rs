@@ -62,7 +62,7 @@ impl Pool {
         sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
     }
 
-    /// Vertices of pages that hold so many chunks whatever their levels, with two pages of each level more.
+    /// Vertices of pages that hold a number of chunks of any levels, with two pages of each level more.
     pub fn most_vertices(sizes: &[usize], chunks: usize) -> usize {
         (chunks.div_ceil(CHUNKS) + 3 * sizes.len()) * CHUNKS * sizes[0]
     }

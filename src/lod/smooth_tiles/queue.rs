@@ -37,7 +37,7 @@ pub struct Queue {
     left: Budget,
     moves: Vec<Move>,
     changed: Vec<usize>,
-    /// Whether a chunk of the last frame found no room in the buffer.
+    /// True if a chunk of the last frame found no room in the buffer.
     is_short: bool,
 }
 
@@ -61,7 +61,7 @@ impl Queue {
         Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed, is_short: false }
     }
 
-    /// Whether the buffer holds chunks of these levels, one a tile, with the pages that moves between them need.
+    /// Returns true if the buffer holds chunks of these levels, one a tile, with the pages for moves between them.
     pub fn holds(&self, levels: impl Iterator<Item = u32>) -> bool {
         let sizes: Vec<_> = (0..=self.cells.ilog2()).map(|level| chunk::vertices(self.cells, level)).collect();
         let mut chunks = vec![0; sizes.len()];
@@ -69,7 +69,7 @@ impl Queue {
         settled_vertices(&sizes, &chunks) <= self.vertices()
     }
 
-    /// Whether a chunk of the last frame found no room in the buffer.
+    /// True if a chunk of the last frame found no room in the buffer.
     pub fn is_short(&self) -> bool {
         self.is_short
     }
@@ -192,7 +192,7 @@ impl Queue {
     }
 }
 
-/// Vertices of a buffer that holds so many chunks of each level, with a page more of each of these levels, and a page of
+/// Vertices of a buffer that holds these chunks by level, with a page more of each of these levels, and a page of
 /// every level for chunks that give way.
 fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
     let unused = chunks.iter().filter(|&&count| count == 0).count();

@@ -11,7 +11,7 @@ use crate::height::Field;
 use crate::height::surface::has_land;
 use crate::view::{Aabb, Containment, View};
 
-/// What is culled and drawn as one: a block, or a square that the field's edge crosses.
+/// A unit of culling and drawing: a block, or a square that the field's edge crosses.
 #[derive(Clone, Copy)]
 struct Square {
     /// Its first block.
@@ -66,7 +66,7 @@ impl Blocks {
         self.squares[block].first
     }
 
-    /// Whether a wedge lies in one block, or in a square that is drawn as one; also if it lies beyond the field.
+    /// Returns true if a wedge lies in one block or in a square that is drawn as one, also beyond the field.
     pub fn hold(&self, corners: [Place; 3]) -> bool {
         let length = |k: usize| {
             let along = corners.map(|at| at[k]);

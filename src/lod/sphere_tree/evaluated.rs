@@ -35,7 +35,7 @@ pub struct Size {
 /// Sizes of diamonds of a land.
 pub struct Evaluated {
     land: Arc<Bezier>,
-    /// What single precision may add to a vertex's height, relative to its distance from the eye.
+    /// The most that single precision adds to a vertex's height, relative to its distance from the eye.
     pub rounding: f64,
     parts: Vec<RwLock<ByIndex<Size>>>,
 }

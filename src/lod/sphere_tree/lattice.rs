@@ -165,14 +165,14 @@ impl Lattice {
         (0..=self.side()).contains(&x) && (0..=self.side()).contains(&z)
     }
 
-    /// Whether a wedge collapses onto the field's edge.
+    /// Returns true if a wedge collapses onto the field's edge.
     #[inline]
     pub fn collapses(&self, wedge: [Place; 3]) -> bool {
         let [[ax, az], [bx, bz], [cx, cz]] = wedge.map(|at| self.on_field(at));
         i64::from(bz - az) * i64::from(cx - ax) == i64::from(bx - ax) * i64::from(cz - az)
     }
 
-    /// Whether a diamond splits in every view: it sticks out of the field and is larger than a square of blocks that are
+    /// Returns true if a diamond splits in every view: it sticks out of the field and is larger than a square of blocks that are
     /// culled together. So no drawn wedge sticks out of the square that it is culled with.
     pub fn always_splits(&self, middle: Place) -> bool {
         let Diamond { ends, apexes } = Diamond::around(middle);

@@ -55,7 +55,7 @@ impl Reach {
         }
     }
 
-    /// Whether a diamond of this error has a sphere. If it has none, its children have none. An infinite error always has.
+    /// Returns true if a diamond of this error has a sphere. If it has none, its children have none. An infinite error always has.
     #[inline]
     pub fn matters(&self, error: f32) -> bool {
         f64::from(error) > self.harmless.max(0.0) || error == f32::INFINITY

@@ -33,7 +33,7 @@ pub struct SweepCase {
     pub view: Viewpoint,
     /// Tolerance, pixels.
     pub tolerance_px: f64,
-    /// Whether the tolerance is the paper's and not the certified one.
+    /// True if the tolerance is the paper's and not the certified one.
     #[serde(default)]
     pub paper_metric: bool,
 }
