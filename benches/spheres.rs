@@ -13,12 +13,12 @@ use std::time::Instant;
 use cuesta::draw::{DrawList, ExplicitVertex};
 use cuesta::height::progress::Progress;
 use cuesta::height::{Field, synth};
+use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
 use cuesta::lod::sphere_tree::covers::Covers;
-use cuesta::lod::sphere_tree::front::{Follower, Watch};
+use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
 use cuesta::lod::sphere_tree::measure::Measured;
 use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::lod::sphere_tree::roam::Queues;
-use cuesta::lod::sphere_tree::shells::Shells;
 use cuesta::lod::sphere_tree::splits::{Found, Splits};
 use cuesta::lod::{self, Settings};
 use cuesta::texture::resolution::{level_by_exponent, level_by_logarithm};
@@ -103,7 +103,12 @@ fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, count: usize
     Row { visited: [visited[FRAMES / 2], visited[FRAMES - 1]], time_us: [times[FRAMES / 2], times[FRAMES - 1]] }
 }
 
-fn following<W: Watch>(begin: impl Fn() -> Follower<W>, measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
+fn following<W: CrossingTracker>(
+    begin: impl Fn() -> Follower<W>,
+    measured: &Measured,
+    path: &[DVec3],
+    reach: Reach,
+) -> Row {
     row(path, reach, ROUNDS, || {
         let mut follower = begin();
         move |from| {
@@ -125,8 +130,8 @@ fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
 }
 
 fn print(name: &str, Row { visited, time_us }: &Row) {
-    let ([visits, most], [us, longest]) = (visited, time_us);
-    println!("    {name:22} {visits:8} wedges (most {most:8}) {us:9.1} µs (longest {longest:9.1})");
+    let ([visits, max], [us, longest]) = (visited, time_us);
+    println!("    {name:22} {visits:8} wedges (most {max:8}) {us:9.1} µs (longest {longest:9.1})");
 }
 
 /// Selects along a path with a technique's own lists: medians and maxima of bytes sent and of time, after the frames that
@@ -201,10 +206,10 @@ fn main() {
             println!("  {name}");
             let bounded = || {
                 let mut bounded = Follower::<Queues>::new(&measured);
-                bounded.watch().largest_speed = FAST_M;
+                bounded.tracker().largest_speed = FAST_M;
                 bounded
             };
-            print("spheres", &following(|| Follower::<Shells>::new(&measured), &measured, &path, reach));
+            print("spheres", &following(|| Follower::<BoundingSpheres>::new(&measured), &measured, &path, reach));
             print("spheres with covers", &following(|| Follower::<Covers>::new(&measured), &measured, &path, reach));
             print("ROAM, way gone", &following(|| Follower::<Queues>::new(&measured), &measured, &path, reach));
             print("ROAM, largest speed", &following(bounded, &measured, &path, reach));

@@ -40,7 +40,7 @@ fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[
         });
         sum[1] += times.fold(f64::INFINITY, f64::min);
         sum[0] += list.triangles() as f64;
-        let pages = strips.figures().into_iter().find(|figure| figure.0 == "pages in sight");
+        let pages = strips.stats().into_iter().find(|figure| figure.0 == "pages in sight");
         sum[2] += pages.map_or(0.0, |figure| figure.1);
     }
     sum.map(|sum| sum / views.len() as f64)

@@ -11,7 +11,7 @@ bool is_block(Node node) {
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= min(scratch.splits, tree.most)) return;
+    if (k >= min(scratch.splits, tree.max_splits)) return;
     uint place = work[tree.list + k];
     Node node = node_at(place);
     uint blocks = 0;

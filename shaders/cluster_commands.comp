@@ -27,7 +27,7 @@ void main() {
         if (tree.skirts == 0) instances[0].cells = 2 * tree.cells;
         if (view.metric == DISTANCE) {
             // It goes nowhere.
-            instances[0].weights = uvec4(BY_DISTANCE * 0x01010101, 0, floatBitsToUint(ways[tree.root]), floatBitsToUint(view.above_squared));
+            instances[0].weights = uvec4(BY_DISTANCE * 0x01010101, 0, floatBitsToUint(ranges[tree.root]), floatBitsToUint(view.above_squared));
         }
         return;
     }

@@ -49,7 +49,7 @@ void weigh_by_distance(uint level, uint state) {
     for (uint quadrant = 0; quadrant < 4; ++quadrant) {
         set(0, quadrant, BY_DISTANCE | (state_at(state, quadrant) == FOUR_BLOCKS ? FINER : 0));
     }
-    weights.yzw = floatBitsToUint(vec3(ways[level + 1], ways[level], view.above_squared));
+    weights.yzw = floatBitsToUint(vec3(ranges[level + 1], ranges[level], view.above_squared));
 }
 
 void main() {
@@ -64,7 +64,7 @@ void main() {
     else stitch(node, state);
     uint at = work[tree.counts + 2 * seed_of(state) + 1] + work[tree.clusters + 2 * k + 1];
     Instance instance = placed(node, node.level - 1);
-    instance.turns = turns_of(state);
+    instance.rotation = rotation_of(state);
     instance.batch = at;
     instance.weights = weights;
     instances[at] = instance;

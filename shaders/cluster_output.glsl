@@ -16,7 +16,7 @@ uint seed_of(uint state) {
     return words[tree.states + state] & 255;
 }
 
-uint turns_of(uint state) {
+uint rotation_of(uint state) {
     return words[tree.states + state] >> 8;
 }
 

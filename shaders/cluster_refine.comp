@@ -8,7 +8,7 @@ void refine(Node node) {
     if (!square(node, known)) return;
     Extent box = extent(node, known.range);
     if (view.culls != 0 && containment(box) == OUTSIDE) return;
-    float allowed = ratio(node.level, box, known.error);
+    float allowed = error_margin(node.level, box, known.error);
     if (allowed < view.band_end) enter(node, allowed);
 }
 

@@ -8,10 +8,10 @@ void main() {
     if (k >= work[row(argument) + COUNT]) return;
     uint place = place_in_level(argument, k);
     Node node = node_at(place);
-    float ratio = uintBitsToFloat(work[tree.ratios + place]);
+    float error_margin = uintBitsToFloat(work[tree.error_margins + place]);
     for (uint axis = 0; axis < 2; ++axis) {
         Node other;
         if (!beyond(node, axis + 2 * (node.at[axis] & 1), other)) continue;
-        if (draws(parent(other))) enter(parent(other), ratio);
+        if (draws(parent(other))) enter(parent(other), error_margin);
     }
 }

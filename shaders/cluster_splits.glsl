@@ -1,6 +1,6 @@
 // The split nodes of a view, in a table that many invocations fill: what they share, and how they are found again.
 // Ids are those of `Node::id` in src/lod/clusters/tree.rs.
-#include "cluster_sight.glsl"
+#include "cluster_lod.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -50,16 +50,16 @@ uint find(Node node) {
 }
 
 // Enters a split node, if it is not there, and takes the lesser ratio.
-void enter(Node node, float ratio) {
+void enter(Node node, float error_margin) {
     uint id = node_id(node);
     uint place = first_place(id);
     for (uint probes = 0; probes < tree.places; ++probes) {
         uint key = atomicCompSwap(work[tree.keys + place], 0, id);
         if (key == 0 || key == id) {
-            atomicMin(work[tree.ratios + place], floatBitsToUint(ratio));
+            atomicMin(work[tree.error_margins + place], floatBitsToUint(error_margin));
             if (key == 0) {
                 uint k = atomicAdd(scratch.splits, 1);
-                if (k >= tree.most) break;
+                if (k >= tree.max_splits) break;
                 work[tree.list + k] = place;
                 atomicMax(scratch.groups.x, k / 64 + 1);
                 uint level_row = row(node.level);

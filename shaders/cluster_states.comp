@@ -13,7 +13,7 @@ uint quadrant_state(Node node, uint blocks, uint quadrant) {
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= min(scratch.splits, tree.most)) return;
+    if (k >= min(scratch.splits, tree.max_splits)) return;
     uint place = work[tree.list + k];
     Node node = node_at(place);
     uint blocks = work[tree.blocks + place];

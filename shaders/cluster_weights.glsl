@@ -10,7 +10,7 @@ bool weight(Node node, out uint found) {
     found = 0;
     uint place = find(node);
     if (place == NONE) return false;
-    precise float part = uintBitsToFloat(work[tree.ratios + place]) - 1.0;
+    precise float part = uintBitsToFloat(work[tree.error_margins + place]) - 1.0;
     precise float scaled = part * view.band_scale;
     if (view.band_scale != 0.0 && !is_partial(node)) found = uint(clamp(scaled, 0.0, float(ONE - 1)));
     return true;

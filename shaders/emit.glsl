@@ -19,7 +19,7 @@ void capture(ivec2 at, float height) {
 void emit_vertex(ivec2 at, float height, uint level, uint batch) {
     out_relative = relative_position(at, height);
     // Relative to the anchor: exact near the eye, however large the field.
-    out_lattice = from_anchor(at);
+    out_lattice = from_render_origin(at);
     out_level_batch = uvec2(level, batch);
     gl_Position = frame.clip_from_relative * vec4(out_relative, 1.0);
 #ifdef CAPTURE

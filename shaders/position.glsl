@@ -33,9 +33,9 @@ struct Placed { ivec2 at; float height; uint level; };
 
 ivec2 turned_position(Instance instance, ivec2 position) {
     int cells = int(instance.cells);
-    if (instance.turns == 1) return ivec2(cells - position.y, position.x);
-    if (instance.turns == 2) return cells - position;
-    if (instance.turns == 3) return ivec2(position.y, cells - position.x);
+    if (instance.rotation == 1) return ivec2(cells - position.y, position.x);
+    if (instance.rotation == 2) return cells - position;
+    if (instance.rotation == 3) return ivec2(position.y, cells - position.x);
     return position;
 }
 
@@ -106,29 +106,29 @@ ivec2 explicit_position(Instance instance, ExplicitVertex vertex) {
     return min(origin + scaled(instance, turned_position(instance, vertex.position)), frame.last << frame.fraction_bits);
 }
 
-vec2 from_anchor(ivec2 at) {
+vec2 from_render_origin(ivec2 at) {
     int unit = 1 << frame.fraction_bits;
-    ivec2 whole = (at >> frame.fraction_bits) - frame.anchor;
+    ivec2 whole = (at >> frame.fraction_bits) - frame.render_origin;
     precise vec2 part = vec2(at & (unit - 1)) * (1.0 / float(unit));
     precise vec2 samples = vec2(whole) + part;
     return samples;
 }
 
-vec2 relative_to_eye(vec2 from_anchor) {
-    precise vec2 plan = from_anchor * frame.spacing;
-    precise vec2 moved = plan + frame.anchor_relative;
+vec2 relative_to_eye(vec2 from_render_origin) {
+    precise vec2 plan = from_render_origin * frame.spacing;
+    precise vec2 moved = plan + frame.render_origin_relative;
     return moved;
 }
 
 vec2 relative_plan(ivec2 at) {
-    return relative_to_eye(vec2(at - frame.anchor));
+    return relative_to_eye(vec2(at - frame.render_origin));
 }
 
 vec3 relative_position(ivec2 at, float height) {
-    vec2 plan = relative_to_eye(from_anchor(at));
-    precise float anchor = frame.anchor_height - frame.height_base;
-    precise float above = height - anchor;
-    precise float y = above + frame.anchor_height_relative;
+    vec2 plan = relative_to_eye(from_render_origin(at));
+    precise float render_origin = frame.render_origin_height - frame.height_base;
+    precise float above = height - render_origin;
+    precise float y = above + frame.render_origin_height_relative;
     return vec3(plan.x, y, plan.y);
 }
 
@@ -162,9 +162,9 @@ float edge_height(Instance instance, ivec2 turned) {
     bool upright = slot.y < 2;
     int along = upright ? turned.y : turned.x;
     int unit = step_at(instance, turned);
-    int further = (along & unit) == 0 ? 1 : 0;
-    int weight = clamp(int(get(instance, slot)) - further * int(ONE), 0, int(ONE));
-    int reach = unit << further;
+    int second_target = (along & unit) == 0 ? 1 : 0;
+    int weight = clamp(int(get(instance, slot)) - second_target * int(ONE), 0, int(ONE));
+    int reach = unit << second_target;
     float sampled = sampled_height(instance, turned);
     if (weight == 0 || (along & reach) == 0) return sampled;
     ivec2 apart = upright ? ivec2(0, reach) : ivec2(reach, 0);
@@ -213,7 +213,7 @@ vec2 explicit_weights(Instance instance, ExplicitVertex vertex) {
 
 float explicit_height(Instance instance, ExplicitVertex vertex) {
     vec2 weights = explicit_weights(instance, vertex);
-    float target = morphed_height(vertex.target, vertex.further, weights.y);
+    float target = morphed_height(vertex.target, vertex.second_target, weights.y);
     return morphed_height(vertex.height, target, weights.x);
 }
 
@@ -225,7 +225,7 @@ vec3 unpack_normal(uint packed) {
 
 vec3 explicit_normal(Instance instance, ExplicitVertex vertex, VertexNormals normals) {
     vec2 weights = explicit_weights(instance, vertex);
-    vec3 target = mix(unpack_normal(normals.target), unpack_normal(normals.further), weights.y);
+    vec3 target = mix(unpack_normal(normals.target), unpack_normal(normals.second_target), weights.y);
     vec3 mean = mix(unpack_normal(normals.normal), target, weights.x);
     // None points down: their mean is not zero, unless two are level and opposite.
     return dot(mean, mean) > 0.0 ? normalize(mean) : vec3(0.0, 1.0, 0.0);
@@ -239,24 +239,24 @@ bool is_skirted(Instance instance) {
 }
 
 // Mesh units, quadrant, and the side that a skirt's vertex is beyond; −1: it is none.
-struct Hung { ivec2 at; int quadrant; int side; };
+struct SkirtVertex { ivec2 at; int quadrant; int side; };
 
-Hung hung(Instance instance, ivec2 turned) {
+SkirtVertex skirt_vertex(Instance instance, ivec2 turned) {
     int lines = (int(instance.cells) + 1) / 2;
     ivec2 half_at = turned / lines;
     ivec2 place = turned % lines - 1;
     int last = lines - 3;
     ivec2 at = half_at * last + clamp(place, 0, last);
     int side = place.x < 0 ? 0 : place.x > last ? 2 : place.y < 0 ? 1 : place.y > last ? 3 : -1;
-    return Hung(at, half_at.x + 2 * half_at.y, side);
+    return SkirtVertex(at, half_at.x + 2 * half_at.y, side);
 }
 
 int quadrant_level(Instance instance, int quadrant) {
     return int(instance.level) - ((get(instance, ivec2(0, quadrant)) & FINER) != 0 ? 1 : 0);
 }
 
-float skirt_depth(Instance instance, Hung hung) {
-    if (hung.side < 0 || ((instance.weights.y >> (4 * hung.quadrant + hung.side)) & 1) == 0) return 0.0;
+float skirt_depth(Instance instance, SkirtVertex skirt_vertex) {
+    if (skirt_vertex.side < 0 || ((instance.weights.y >> (4 * skirt_vertex.quadrant + skirt_vertex.side)) & 1) == 0) return 0.0;
     return uintBitsToFloat(instance.weights.z);
 }
 
@@ -269,11 +269,11 @@ float quadrant_height(Instance instance, ivec2 at, int level, uint weight) {
 }
 
 Placed hung_vertex(Instance instance, ivec2 turned) {
-    Hung hung = hung(instance, turned);
-    int level = quadrant_level(instance, hung.quadrant);
-    uint weight = get(instance, ivec2(0, hung.quadrant)) & ~FINER;
-    precise float height = quadrant_height(instance, hung.at, level, weight) - skirt_depth(instance, hung);
-    return Placed(lattice_position(instance, hung.at), height, uint(level) | (hung.side < 0 ? 0 : SKIRT));
+    SkirtVertex skirt_vertex = skirt_vertex(instance, turned);
+    int level = quadrant_level(instance, skirt_vertex.quadrant);
+    uint weight = get(instance, ivec2(0, skirt_vertex.quadrant)) & ~FINER;
+    precise float height = quadrant_height(instance, skirt_vertex.at, level, weight) - skirt_depth(instance, skirt_vertex);
+    return Placed(lattice_position(instance, skirt_vertex.at), height, uint(level) | (skirt_vertex.side < 0 ? 0 : SKIRT));
 }
 
 // Weights by distance: src/draw/distance.rs.

@@ -3,8 +3,8 @@
 layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
 layout(set = 0, binding = 3) uniform sampler2D overlay;
 
-// The overlay as maps of its pages (src/texture/picture_maps.rs): tiles, and for each page which one and its level. Or
-// nodes of the ground (src/texture/node_table.rs).
+// The overlay as maps of its pages (src/texture/virtual_overlay.rs): tiles, and for each page which one and its level. Or
+// nodes of the ground (src/texture/page_table.rs).
 layout(set = 0, binding = 6) uniform sampler2DArray maps;
 layout(set = 0, binding = 7, scalar) readonly buffer MapTable { uint map_table[]; };
 
@@ -32,8 +32,8 @@ bool is_hole(ivec2 at) {
 struct Cell { ivec2 at; vec2 inside; bool falling; };
 
 Cell cell_at(vec2 lattice) {
-    ivec2 at = clamp(ivec2(floor(lattice)) + frame.anchor, ivec2(0), frame.last - 1);
-    vec2 inside = clamp(lattice - vec2(at - frame.anchor), 0.0, 1.0);
+    ivec2 at = clamp(ivec2(floor(lattice)) + frame.render_origin, ivec2(0), frame.last - 1);
+    vec2 inside = clamp(lattice - vec2(at - frame.render_origin), 0.0, 1.0);
     return Cell(at, inside, ((at.x + at.y) & 1) == 0);
 }
 
@@ -62,12 +62,12 @@ float true_height(Cell cell, bool is_ceiling) {
 
 float linear_height(vec2 lattice, bool is_ceiling) {
     if (FILTERED) {
-        vec3 uv = vec3((lattice + vec2(frame.anchor_stored) + 0.5) / vec2(frame.stored), 0.0);
+        vec3 uv = vec3((lattice + vec2(frame.render_origin_stored) + 0.5) / vec2(frame.stored), 0.0);
         float stored = CEILING && is_ceiling ? textureLod(ceiling_pages, uv, 0.0).r : textureLod(height_pages, uv, 0.0).r;
         return CODED ? (stored * 65535.0 - frame.height_zero) * frame.height_scale : stored;
     }
-    ivec2 at = clamp(ivec2(floor(lattice)) + frame.anchor, ivec2(0), frame.last - 1);
-    vec2 p = clamp(lattice - vec2(at - frame.anchor), 0.0, 1.0);
+    ivec2 at = clamp(ivec2(floor(lattice)) + frame.render_origin, ivec2(0), frame.last - 1);
+    vec2 p = clamp(lattice - vec2(at - frame.render_origin), 0.0, 1.0);
     float north = mix(surface_height(at, is_ceiling), surface_height(at + ivec2(1, 0), is_ceiling), p.x);
     float south = mix(surface_height(at + ivec2(0, 1), is_ceiling), surface_height(at + ivec2(1), is_ceiling), p.x);
     return mix(north, south, p.y);
@@ -80,7 +80,7 @@ float pixel_at(vec3 relative) {
 
 // Height of a point relative to the eye, metres.
 float height_of(vec3 relative) {
-    return (relative.y - frame.anchor_height_relative) + frame.anchor_height;
+    return (relative.y - frame.render_origin_height_relative) + frame.render_origin_height;
 }
 
 // Whether a point of the drawn surface is the ceiling's: nearer to it than to the floor.
@@ -94,8 +94,8 @@ vec3 normal_at(vec3 relative, vec2 lattice) {
     bool is_ceiling = is_of_ceiling(relative, lattice);
     float pixel = pixel_at(relative);
     vec2 reach = max(vec2(1.0), pixel / frame.spacing);
-    vec2 last = vec2(frame.last - frame.anchor);
-    vec2 first = vec2(-frame.anchor);
+    vec2 last = vec2(frame.last - frame.render_origin);
+    vec2 first = vec2(-frame.render_origin);
     vec2 west = vec2(max(lattice.x - reach.x, first.x), lattice.y);
     vec2 east = vec2(min(lattice.x + reach.x, last.x), lattice.y);
     vec2 north = vec2(lattice.x, max(lattice.y - reach.y, first.y));
@@ -218,7 +218,7 @@ bool is_open(vec2 lattice) {
 
 // Colour of the surface at a point relative to the eye over a lattice position relative to the anchor, which changes by
 // `steps` from pixel to pixel, along x and y.
-vec3 land_colour(vec3 relative, vec2 lattice, vec4 steps, vec3 normal, uvec2 level_batch) {
+vec3 terrain_colour(vec3 relative, vec2 lattice, vec4 steps, vec3 normal, uvec2 level_batch) {
     Cell cell = cell_at(lattice);
     float distance = length(relative);
     float pixel = pixel_at(relative);

@@ -26,5 +26,5 @@ void main() {
 #else
     vec3 normal = normal_at(in_relative, in_lattice);
 #endif
-    out_colour = vec4(land_colour(in_relative, in_lattice, steps, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
+    out_colour = vec4(terrain_colour(in_relative, in_lattice, steps, normal, in_level_batch), is_skirt ? 0.5 : 1.0);
 }

@@ -5,8 +5,9 @@
 //!
 //! - [`view`]: eye, projection, frustum, tolerance.
 //! - [`height`]: height data: files, synthesis, bounds, the surface between samples.
-//! - [`draw`]: the neck: a frame as plain data.
+//! - [`draw`]: the draw list: a frame as plain data.
 //! - [`texture`]: textures made at start.
+//! - [`renamed`]: former names of JSON fields.
 //! - [`lod`]: the techniques: from a view to a frame.
 //! - [`plan`]: what a scene needs, and so what is left out.
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
@@ -14,7 +15,7 @@
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
 //! - [`mod@bench`]: error against run time, along named paths.
 //! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
-//! - [`stress`]: the laws, and the battery of stiff and extreme cases.
+//! - [`stress`]: the invariants, and the suite of stiff and extreme cases.
 //! - [`report`]: rows as a page and plots.
 //! - [`viewer`]: the window (feature `viewer`).
 //! - [`cli`]: the program.
@@ -26,6 +27,8 @@ pub mod height;
 pub mod draw;
 
 pub mod texture;
+
+pub mod renamed;
 
 pub mod lod;
 

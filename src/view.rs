@@ -28,9 +28,9 @@ impl Aabb {
     /// The least and the largest distance of its points from a place in plan (x, z).
     fn distances_in_plan(&self, [x, z]: [f64; 2]) -> (f64, f64) {
         let (min, max) = ([self.min.x - x, self.min.z - z], [self.max.x - x, self.max.z - z]);
-        let least = [0, 1].map(|k| min[k].max(-max[k]).max(0.0));
-        let most = [0, 1].map(|k| max[k].max(-min[k]));
-        (least[0].hypot(least[1]), most[0].hypot(most[1]))
+        let min = [0, 1].map(|k| min[k].max(-max[k]).max(0.0));
+        let max = [0, 1].map(|k| max[k].max(-min[k]));
+        (min[0].hypot(min[1]), max[0].hypot(max[1]))
     }
 
     /// Largest value of `normal · p` over the box.
@@ -129,11 +129,11 @@ impl Frustum {
     pub fn contains(&self, bounds: &Aabb) -> Containment {
         let mut containment = Containment::Inside;
         if let Some((eye, reach_m)) = self.reach {
-            let (least, most) = bounds.distances_in_plan(eye);
-            if least > reach_m {
+            let (min, max) = bounds.distances_in_plan(eye);
+            if min > reach_m {
                 return Containment::Outside;
             }
-            if most > reach_m {
+            if max > reach_m {
                 containment = Containment::Crossing;
             }
         }

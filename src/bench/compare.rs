@@ -5,7 +5,7 @@
 //!
 //! All cases of a technique are tested together: that is a regression if the whole interval lies above 1 + threshold.
 //! A single case, or all floors together, are one if it lies above 1 + twice the threshold. Many things are tested at
-//! once, so tails are divided among the techniques and among the cases (Bonferroni). With fewer than [`LEAST_ROUNDS`]
+//! once, so tails are divided among the techniques and among the cases (Bonferroni). With fewer than [`MIN_ROUNDS`]
 //! rounds in either run no time is judged.
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::results::{CaseResult, Results};
 use super::rows::Errors;
-use super::slowdown::{Cost, LEAST_ROUNDS, Pair, has_floors, slowdown};
+use super::slowdown::{Cost, MIN_ROUNDS, Pair, has_shading_only, slowdown};
 use super::statistics::Estimate;
 
 /// What is no regression yet: a tenth.
@@ -30,9 +30,9 @@ pub struct Comparison {
     /// Whether both runs have rounds enough to judge times by.
     pub is_judged: bool,
     /// Whether times are over the floor's; milliseconds where one of the two has no floors.
-    pub over_floor: bool,
+    pub over_shading_only: bool,
     /// Times of the floors, all cases together.
-    pub floors: Option<Change>,
+    pub shading_only: Option<Change>,
     /// Times by technique, all its cases together.
     pub techniques: Vec<Change>,
     /// Times by case.
@@ -76,13 +76,13 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
     let timed: Vec<_> = pairs.iter().copied().filter(|(a, b)| a.time.is_some() && b.time.is_some()).collect();
-    let is_judged = timed.iter().all(|(a, b)| a.rounds.len().min(b.rounds.len()) >= LEAST_ROUNDS);
-    let over_floor = timed.iter().all(|(a, b)| has_floors(a) && has_floors(b));
+    let is_judged = timed.iter().all(|(a, b)| a.rounds.len().min(b.rounds.len()) >= MIN_ROUNDS);
+    let over_shading_only = timed.iter().all(|(a, b)| has_shading_only(a) && has_shading_only(b));
     let change = |what: String, pairs: &[Pair], cost: Cost, family: usize, allowed: f64| {
         let ratio = slowdown(pairs, cost, ALARM / family as f64);
         Change { what, ratio, is_regression: is_judged && ratio.low > 1.0 + allowed }
     };
-    let cost = if over_floor { Cost::OverFloor } else { Cost::Frame };
+    let cost = if over_shading_only { Cost::OverShadingOnly } else { Cost::FrameSample };
     let of_case = |pair: &Pair| change(pair.0.case.to_string(), &[*pair], cost, timed.len(), 2.0 * threshold);
     let cases: Vec<_> = timed.iter().map(of_case).collect();
     let families = by_technique(&timed);
@@ -90,13 +90,24 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let of_technique =
         |(name, pairs): (&String, &Vec<Pair>)| change(together(name, pairs), pairs, cost, families.len(), threshold);
     let techniques: Vec<_> = families.iter().map(of_technique).collect();
-    let has_floors = over_floor && !timed.is_empty();
-    let floors = has_floors.then(|| change(together("floor", &timed), &timed, Cost::Floor, 1, 2.0 * threshold));
+    let has_shading_only = over_shading_only && !timed.is_empty();
+    let shading_only = has_shading_only
+        .then(|| change(together("shading only", &timed), &timed, Cost::ShadingOnly, 1, 2.0 * threshold));
     let differences: Vec<_> = pairs.iter().flat_map(|(a, b)| differences(a, b, threshold)).collect();
-    let regressions = regressions(floors.iter().chain(&techniques).chain(&cases), &differences);
+    let regressions = regressions(shading_only.iter().chain(&techniques).chain(&cases), &differences);
     let matched = pairs.len();
     let unmatched = unmatched(a, b);
-    Comparison { matched, is_judged, over_floor, floors, techniques, cases, differences, unmatched, regressions }
+    Comparison {
+        matched,
+        is_judged,
+        over_shading_only,
+        shading_only,
+        techniques,
+        cases,
+        differences,
+        unmatched,
+        regressions,
+    }
 }
 
 fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
@@ -121,8 +132,8 @@ const EXACT: &[Exact] = &[
     ("not watertight", |e| e.watertight.map(|is| f64::from(u8::from(!is))), true),
     ("hole_pixels", |e| e.hole_pixels.map(|n| n as f64), true),
     ("skirt_pixels", |e| e.skirt_pixels.map(|n| n as f64), false),
-    ("waiting.pixels", |e| e.waiting.map(|w| w.pixels as f64), true),
-    ("waiting.excess_px", |e| e.waiting.map(|w| w.excess_px), true),
+    ("pending.pixels", |e| e.pending.map(|w| w.pixels as f64), true),
+    ("pending.excess_px", |e| e.pending.map(|w| w.excess_px), true),
     ("pop.p99_px", |e| e.pop.as_ref().map(|p| p.p99_px), false),
     ("pop.max_px", |e| e.pop.as_ref().map(|p| p.max_px), false),
 ];

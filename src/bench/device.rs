@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 
-use super::held::Helm;
+use super::goal::ToleranceController;
 use super::paths::TIME_STEP_S;
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
-use super::run::{Frame, Laboratory, Scene, Timed};
+use super::run::{BenchBackend, BenchScene, FrameSample, Timed};
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout;
 use crate::draw::{DrawList, Geometry};
@@ -21,21 +21,21 @@ use crate::measure::{economy, geometric, pop, watertight};
 use crate::plan::{self, Look, ScenePlan};
 use crate::scene::capture::AsDrawn;
 use crate::scene::holes::{Truth, covered, skirts};
-use crate::scene::{self, Copy, Stage};
+use crate::scene::{self, Copy, SceneRenderer};
 use crate::view::View;
 
 /// Lists of more triangles are not captured: comparing them to their expansion would take minutes.
 const CAPTURED: u64 = 4_000_000;
 
 /// Draws on one device with one look.
-pub struct DeviceLaboratory {
+pub struct DeviceBackend {
     gpu: Arc<Gpu>,
     look: Look,
     /// The scene whose truths are kept, and they, by frame.
     truths: (String, BTreeMap<usize, Arc<Truth>>),
 }
 
-impl DeviceLaboratory {
+impl DeviceBackend {
     /// On this device.
     pub fn new(gpu: Arc<Gpu>, look: Look) -> Self {
         Self { gpu, look, truths: Default::default() }
@@ -43,15 +43,15 @@ impl DeviceLaboratory {
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_manner(technique.manner()))
+        Ok(plan.with_requirements(technique.pipeline_requirements()))
     }
 
     /// A technique as it is when just made, and its stage.
-    fn set(&self, scene: &Scene) -> Result<(Box<dyn Technique>, Stage)> {
+    fn set(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
         let technique = build(scene.case, scene.field)?;
         let plan = self.plan(scene.field, technique.as_ref())?;
-        let stage = self.scene(scene.field, &plan).stage(technique.as_ref(), scene.case.size)?;
-        Ok((technique, stage))
+        let renderer = self.scene(scene.field, &plan).renderer(technique.as_ref(), scene.case.size)?;
+        Ok((technique, renderer))
     }
 
     fn scene<'a>(&'a self, field: &'a Arc<Field>, plan: &'a ScenePlan) -> scene::Scene<'a> {
@@ -59,7 +59,7 @@ impl DeviceLaboratory {
     }
 
     /// The truth of a frame: drawn once for all cases of a scene.
-    fn truth(&mut self, scene: &Scene, frame: usize) -> Result<Arc<Truth>> {
+    fn truth(&mut self, scene: &BenchScene, frame: usize) -> Result<Arc<Truth>> {
         let name = scene.case.scene();
         if self.truths.0 != name {
             self.truths = (name, BTreeMap::new());
@@ -85,7 +85,7 @@ fn build(case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
     entry.prepare(field, &settings).map_err(anyhow::Error::msg)
 }
 
-impl Laboratory for DeviceLaboratory {
+impl BenchBackend for DeviceBackend {
     fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)> {
         let candidate = &self.gpu.candidate;
         let device =
@@ -99,67 +99,67 @@ impl Laboratory for DeviceLaboratory {
         Ok((device, fields.iter().map(plan).collect::<Result<_>>()?))
     }
 
-    fn time(&mut self, scene: &Scene) -> Result<Timed> {
-        let (mut technique, mut stage) = self.set(scene)?;
+    fn time(&mut self, scene: &BenchScene) -> Result<Timed> {
+        let (mut technique, mut renderer) = self.set(scene)?;
         let has_clock = self.gpu.timestamp_ns > 0.0;
-        let mut helm = Helm::new(scene.case);
-        let draw = |view: &View| -> Result<Frame> {
-            let view = &helm.view(view);
-            let times = stage.draw(technique.as_mut(), view, Copy::Nothing)?;
-            let floor = stage.draw_floor(view, Copy::Nothing)?;
-            let list = &stage.list;
-            helm.learn(view, list.triangles(), times.frame_ms);
-            Ok(Frame {
+        let mut controller = ToleranceController::new(scene.case);
+        let draw = |view: &View| -> Result<FrameSample> {
+            let view = &controller.view(view);
+            let times = renderer.draw(technique.as_mut(), view, Copy::Nothing)?;
+            let shading_only = renderer.draw_shading_only(view, Copy::Nothing)?;
+            let list = &renderer.list;
+            controller.learn(view, list.triangles(), times.frame_ms);
+            Ok(FrameSample {
                 frame_ms: times.frame_ms,
                 select_ms: times.select_ms,
                 record_ms: times.record_ms,
                 gpu_ms: has_clock.then_some(times.gpu.total_ms),
                 upload_ms: Some(times.upload_ms),
-                floor_ms: Some(floor.frame_ms),
+                shading_only_ms: Some(shading_only.frame_ms),
                 triangles: list.triangles(),
                 vertices: times.gpu.statistics.map(|[vertices, ..]| vertices),
                 draws: list.draws.len() as u64,
                 commands: list.commands() as u64,
-                widening: list.widening,
-                waiting: list.waiting as u64,
+                tolerance_scale: list.tolerance_scale,
+                pending: list.pending as u64,
                 tolerance_px: view.tolerance.px,
             })
         };
         let frames = scene.views.iter().map(draw).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().into_iter().map(|(purpose, n)| (purpose.to_string(), n)).collect();
-        let figures = technique.figures().into_iter().map(|(name, value, _)| (name.to_string(), value)).collect();
-        Ok(Timed { frames, device_bytes, figures })
+        let stats = technique.stats().into_iter().map(|(name, value, _)| (name.to_string(), value)).collect();
+        Ok(Timed { frames, device_bytes, stats })
     }
 
-    fn measure(&mut self, scene: &Scene) -> Result<Errors> {
-        let (mut technique, mut stage) = self.set(scene)?;
+    fn measure(&mut self, scene: &BenchScene) -> Result<Errors> {
+        let (mut technique, mut renderer) = self.set(scene)?;
         let mut pool = Pool::default();
         let mut before: Option<(View, Geometry, DrawList)> = None;
-        let mut helm = Helm::new(scene.case);
+        let mut controller = ToleranceController::new(scene.case);
         for (frame, pose) in scene.views.iter().enumerate() {
-            let view = &helm.view(pose);
+            let view = &controller.view(pose);
             let is_measured = frame % scene.case.every == 0;
             let copy = if is_measured { Copy::PictureAndDepth } else { Copy::Nothing };
-            stage.time_s = frame as f64 * TIME_STEP_S;
-            let times = stage.draw(technique.as_mut(), view, copy)?;
-            stage.complete()?;
-            helm.learn(view, stage.list.triangles(), times.frame_ms);
+            renderer.time_s = frame as f64 * TIME_STEP_S;
+            let times = renderer.draw(technique.as_mut(), view, copy)?;
+            renderer.complete()?;
+            controller.learn(view, renderer.list.triangles(), times.frame_ms);
             if is_measured {
                 let truth = self.truth(scene, frame)?;
                 let fragments = [times.gpu.statistics.map(|[.., run]| run), times.gpu.passed];
-                look(scene, (frame, view), technique.as_ref(), &mut stage, &truth, fragments, &mut pool)?;
+                look(scene, (frame, view), technique.as_ref(), &mut renderer, &truth, fragments, &mut pool)?;
                 let plan = self.plan(scene.field, technique.as_ref())?;
                 let drawn = self.scene(scene.field, &plan);
-                pool.hole_pixels(truth.hole_pixels(&drawn, view, &stage.picture())?.len());
+                pool.hole_pixels(truth.hole_pixels(&drawn, view, &renderer.picture())?.len());
                 if let Some((from, resident, list)) = &before {
                     let old = pop::State { view: from, resident, list };
-                    let new = pop::State { view, resident: technique.resident(), list: &stage.list };
+                    let new = pop::State { view, resident: technique.resident(), list: &renderer.list };
                     pool.pop(&pop::pop(scene.field, old, new));
                 }
             }
             // What the next frame is held against, if it is measured.
             let is_wanted = (frame + 1) % scene.case.every == 0;
-            before = is_wanted.then(|| (*view, technique.resident().clone(), stage.list.clone()));
+            before = is_wanted.then(|| (*view, technique.resident().clone(), renderer.list.clone()));
         }
         pool.finish(scene)
     }
@@ -175,36 +175,39 @@ fn decision(of_plan: plan::Decision) -> Decision {
 
 /// Measures one frame.
 fn look(
-    scene: &Scene,
+    scene: &BenchScene,
     (frame, view): (usize, &View),
     technique: &dyn Technique,
-    stage: &mut Stage,
+    renderer: &mut SceneRenderer,
     truth: &Truth,
     fragments: [Option<u64>; 2],
     pool: &mut Pool,
 ) -> Result<()> {
     let (field, resident) = (scene.field, technique.resident());
-    let picture = stage.picture();
-    if stage.list.triangles() <= CAPTURED && stage.captures() {
+    let picture = renderer.picture();
+    if renderer.list.triangles() <= CAPTURED && renderer.captures() {
         let placing = layout::Frame::placing(field, view);
         let expanded = [
-            expand::triangles(field, &placing, resident, &stage.list),
-            expand::skirts(field, &placing, resident, &stage.list),
+            expand::triangles(field, &placing, resident, &renderer.list),
+            expand::skirts(field, &placing, resident, &renderer.list),
         ];
-        let captured = stage.capture(technique, view)?;
+        let captured = renderer.capture(technique, view)?;
         let same = |(there, here): (&Vec<AsDrawn>, &Vec<Drawn>)| there.iter().map(|t| t.drawn).eq(here.iter().copied());
         pool.captured(captured.iter().zip(&expanded).all(same));
     }
-    pool.proof(frame, watertight::prove_list(field, view, technique.manner().seams, resident, &stage.list));
-    let is_kept = stage.list.widening == 1.0;
-    let errors = geometric::errors(field, view, resident, &stage.list);
+    pool.proof(
+        frame,
+        watertight::prove_list(field, view, technique.pipeline_requirements().seams, resident, &renderer.list),
+    );
+    let is_kept = renderer.list.tolerance_scale == 1.0;
+    let errors = geometric::errors(field, view, resident, &renderer.list);
     pool.errors(frame, &errors, is_kept.then_some(view.tolerance.px));
     let covered = covered(&picture).into_iter().filter(|&c| c).count() as u64;
-    let depth = stage.depth();
-    if stage.list.waiting > 0 {
-        pool.waiting(field, view, errors.screen_px.max, &depth);
+    let depth = renderer.depth();
+    if renderer.list.pending > 0 {
+        pool.pending(field, view, errors.screen_px.max, &depth);
     }
-    pool.economy(&economy::economy(field, view, resident, &stage.list, &depth), fragments, covered);
+    pool.economy(&economy::economy(field, view, resident, &renderer.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
     pool.skirt_pixels(skirts(&picture).into_iter().filter(|&is| is).count());
     pool.picture(frame, &picture, &truth.picture)

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 
 use super::rows::{Header, Row, SCHEMA};
+use crate::renamed;
 
 /// Name of the file in a benchmark's directory.
 pub const ROWS: &str = "rows.jsonl";
@@ -52,7 +53,9 @@ impl Journal {
     }
 
     fn write(&mut self, row: &Row) -> Result<()> {
-        let line = serde_json::to_string(row)? + "\n";
+        let mut value = serde_json::to_value(row)?;
+        renamed::add_former_names(&mut value);
+        let line = value.to_string() + "\n";
         let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.sync_data());
         written.with_context(|| self.name.clone())
     }
@@ -84,8 +87,14 @@ pub fn read(folder: &Path) -> Result<(Header, Vec<Row>)> {
 
 fn parse(text: &[u8], name: &str) -> Result<Vec<Row>> {
     let lines = text.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).enumerate();
-    let row = |(k, line)| serde_json::from_slice(line).with_context(|| format!("{name}: line {}", k + 1));
+    let row = |(k, line)| row(line).with_context(|| format!("{name}: line {}", k + 1));
     lines.map(row).collect()
+}
+
+fn row(line: &[u8]) -> serde_json::Result<Row> {
+    let mut value = serde_json::from_slice(line)?;
+    renamed::drop_former_names(&mut value);
+    serde_json::from_value(value)
 }
 
 /// What differs between two runs, so that their rows must not be mixed.

@@ -43,7 +43,7 @@ mod tests {
     #[test]
     fn memory_held_counts() {
         let before = host_bytes().unwrap();
-        let held = vec![1u8; 64 << 20];
-        assert!(host_bytes().unwrap() >= before.max(held.iter().map(|&b| u64::from(b)).sum()));
+        let budget = vec![1u8; 64 << 20];
+        assert!(host_bytes().unwrap() >= before.max(budget.iter().map(|&b| u64::from(b)).sum()));
     }
 }

@@ -1,10 +1,10 @@
 //! Error against run time: named paths, cases run in turn in one process, rows that reach the file as they come,
-//! and what changed from one run to another. The driver knows no device: whoever draws is a [`Laboratory`].
+//! and what changed from one run to another. The driver knows no device: whoever draws is a [`BenchBackend`].
 
 pub mod compare;
 #[cfg(feature = "vulkan")]
 pub mod device;
-pub mod held;
+pub mod goal;
 pub mod journal;
 pub mod kit;
 pub mod machine;
@@ -17,4 +17,4 @@ pub mod slowdown;
 pub mod statistics;
 
 pub use rows::{Case, Errors, Header, Row, SCHEMA, Terrain, Times};
-pub use run::{Frame, Laboratory, Scene, Timed};
+pub use run::{BenchBackend, BenchScene, FrameSample, Timed};

@@ -6,9 +6,9 @@ use anyhow::{Context, Result};
 use image::{RgbImage, RgbaImage};
 
 use super::rows::{
-    AngleBin, Bin, Economy, Errors, ImageError, PeersError, Pop, Reference, Summary, Waiting, Within, Worst,
+    AngleBin, Bin, Economy, Errors, ImageError, PeersError, PendingFrames, Pop, Reference, Summary, Within, Worst,
 };
-use super::run::Scene;
+use super::run::BenchScene;
 use crate::height::{Field, save};
 use crate::measure::economy::{self, overdraw};
 use crate::measure::histogram::Histogram;
@@ -49,7 +49,7 @@ pub struct Pool {
     covered: u64,
     peers: peers::Pool,
     pictures: Vec<pictures::Difference>,
-    waiting: Waiting,
+    pending: PendingFrames,
     /// Picture and difference of the worst frame so far.
     shots: Option<(usize, RgbImage, RgbImage)>,
 }
@@ -96,12 +96,12 @@ impl Pool {
     }
 
     /// A frame in which a refinement waited, by its largest error, and its depth.
-    pub fn waiting(&mut self, field: &Field, view: &View, max_px: f64, depth: &[f32]) {
+    pub fn pending(&mut self, field: &Field, view: &View, max_px: f64, depth: &[f32]) {
         let excess_px = (max_px - view.tolerance.px).max(0.0);
-        self.waiting.frames += 1;
-        self.waiting.kept += usize::from(excess_px == 0.0);
-        self.waiting.pixels += beyond::pixels(field, view, depth);
-        self.waiting.excess_px = self.waiting.excess_px.max(excess_px);
+        self.pending.frames += 1;
+        self.pending.kept += usize::from(excess_px == 0.0);
+        self.pending.pixels += beyond::pixels(field, view, depth);
+        self.pending.excess_px = self.pending.excess_px.max(excess_px);
     }
 
     /// Whether a frame was proven to be one surface.
@@ -161,8 +161,8 @@ impl Pool {
     /// A frame's picture against the truth's.
     pub fn picture(&mut self, frame: usize, picture: &RgbaImage, truth: &RgbaImage) -> Result<()> {
         let [picture, truth] = [picture, truth].map(|rgba| image::DynamicImage::from(rgba.clone()).into_rgb8());
-        let (figures, difference) = pictures::compare(&picture, &truth)?;
-        self.pictures.push(figures);
+        let (stats, difference) = pictures::compare(&picture, &truth)?;
+        self.pictures.push(stats);
         if self.worst.is_some_and(|(worst, _)| worst == frame) {
             self.shots = Some((frame, picture, difference));
         }
@@ -170,7 +170,7 @@ impl Pool {
     }
 
     /// What a case's row says; the worst frame's pictures are written.
-    pub fn finish(self, scene: &Scene) -> Result<Errors> {
+    pub fn finish(self, scene: &BenchScene) -> Result<Errors> {
         let worst = match (&self.worst, &self.shots) {
             (Some((frame, error_px)), Some((_, picture, difference))) => {
                 let save = |what: &str, picture| save_picture(scene, what, picture).map(Some);
@@ -220,7 +220,7 @@ impl Pool {
                 max: peers.max,
             }),
             worst,
-            waiting: Some(self.waiting),
+            pending: Some(self.pending),
         })
     }
 
@@ -250,7 +250,7 @@ impl Pool {
     }
 
     /// Near-optimal meshes of the field at the case's largest vertical error, where that is one.
-    fn reference(&self, scene: &Scene) -> Result<Option<Reference>> {
+    fn reference(&self, scene: &BenchScene) -> Result<Option<Reference>> {
         let [columns, rows] = scene.field.size().map(u64::from);
         let error_m = self.metres.max;
         if !(error_m.is_finite() && error_m > 0.0) || columns * rows > REFERENCE {
@@ -273,7 +273,7 @@ fn bins(histogram: &Histogram) -> Vec<Bin> {
 }
 
 /// Writes a picture of a case; its name relative to the folder.
-fn save_picture(scene: &Scene, what: &str, picture: &RgbImage) -> Result<String> {
+fn save_picture(scene: &BenchScene, what: &str, picture: &RgbImage) -> Result<String> {
     let mut name: String =
         format!("{}-{what}", scene.case).chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
     while name.contains("--") {

@@ -8,11 +8,12 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::held::Held;
+use super::goal::BudgetStats;
 use super::journal;
 use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, extended, kept};
 use super::statistics::{Estimate, middle};
 use crate::height::save::replace;
+use crate::renamed;
 
 /// Name of the file with everything.
 pub const RESULTS: &str = "results.json";
@@ -63,9 +64,9 @@ pub struct TimeSummary {
     /// Median time of copying to the device, milliseconds.
     pub upload_ms: Option<f64>,
     /// Median time of the same picture in one full-screen pass, milliseconds.
-    pub floor_ms: Option<f64>,
+    pub shading_only_ms: Option<f64>,
     /// Frame time over the floor's, pair by pair within a round.
-    pub over_floor: Option<Estimate>,
+    pub over_shading_only: Option<Estimate>,
     /// Frame time over the base case's of the same scene, pair by pair within a round.
     pub over_base: Option<Estimate>,
     /// Median of selection and recording together, milliseconds: what the host does of a frame.
@@ -83,15 +84,15 @@ pub struct TimeSummary {
     /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
     /// kept.
     #[serde(with = "extended", default = "kept")]
-    pub widening: f64,
+    pub tolerance_scale: f64,
     /// How well the goal was held, if there is one.
     #[serde(default)]
-    pub held: Option<Held>,
+    pub budget: Option<BudgetStats>,
     /// Device bytes, all purposes together.
     pub device_bytes: u64,
     /// What the technique told of itself, by name.
     #[serde(default)]
-    pub figures: BTreeMap<String, f64>,
+    pub stats: BTreeMap<String, f64>,
 }
 
 impl Results {
@@ -166,7 +167,8 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         (!ratios.is_empty()).then(|| Estimate::median(&ratios))
     };
     let median = |cost: Cost| Estimate::median(&rounds.iter().map(cost).collect::<Vec<_>>());
-    let floors: Option<Vec<f64>> = rounds.iter().map(|r| r.floor_ms.map(|floor| r.frame_ms.p50 / floor.p50)).collect();
+    let shading_only: Option<Vec<f64>> =
+        rounds.iter().map(|r| r.shading_only_ms.map(|shading_only| r.frame_ms.p50 / shading_only.p50)).collect();
     // Rows are text that anyone may have written: sums of any numbers are no fault.
     let frames = rounds.len().saturating_mul(result.case.frames).max(1);
     Some(TimeSummary {
@@ -178,8 +180,8 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         record_ms: over(|r| r.record_ms.p50),
         gpu_ms: measured(|r| r.gpu_ms.map(|p| p.p50)),
         upload_ms: measured(|r| r.upload_ms.map(|p| p.p50)),
-        floor_ms: measured(|r| r.floor_ms.map(|p| p.p50)),
-        over_floor: floors.map(|ratios| Estimate::median(&ratios)),
+        shading_only_ms: measured(|r| r.shading_only_ms.map(|p| p.p50)),
+        over_shading_only: shading_only.map(|ratios| Estimate::median(&ratios)),
         over_base: over_base(frame_ms),
         cpu_ms: median(cpu_ms),
         cpu_over_base: over_base(cpu_ms),
@@ -187,10 +189,10 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
         triangles: over(|r| r.triangles.mean),
         draws: over(|r| r.draws.mean),
         commands: over(|r| r.commands.mean),
-        widening: rounds.iter().map(|r| r.widening).fold(1.0, f64::max),
-        held: Held::median(&rounds.iter().filter_map(|r| r.held).collect::<Vec<_>>()),
+        tolerance_scale: rounds.iter().map(|r| r.tolerance_scale).fold(1.0, f64::max),
+        budget: BudgetStats::median(&rounds.iter().filter_map(|r| r.budget).collect::<Vec<_>>()),
         device_bytes: rounds.iter().map(device_bytes).max().unwrap_or(0),
-        figures: rounds.last().map(|r| r.figures.clone()).unwrap_or_default(),
+        stats: rounds.last().map(|r| r.stats.clone()).unwrap_or_default(),
     })
 }
 
@@ -225,7 +227,9 @@ pub fn frame_ratio(of: &CaseResult, over: &CaseResult) -> Option<Estimate> {
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let results = Results::read(folder)?;
     let path = folder.join(RESULTS);
-    let text = serde_json::to_string_pretty(&results)? + "\n";
+    let mut value = serde_json::to_value(&results)?;
+    renamed::add_former_names(&mut value);
+    let text = serde_json::to_string_pretty(&value)? + "\n";
     save(&path, text.as_bytes())?;
     save(&folder.join(TABLE), &table(&results)?)?;
     Ok(path)

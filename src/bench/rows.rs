@@ -6,7 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::held::{Goal, Held};
+use super::goal::{BudgetStats, Goal};
 use super::statistics::{Percentiles, Spread};
 
 /// Version of rows and results. It grows when a reader of the old ones would misread the new ones.
@@ -154,13 +154,13 @@ pub struct Times {
     /// Copying to the device.
     pub upload_ms: Option<Percentiles>,
     /// The same pose with the same fragment work in one full-screen pass.
-    pub floor_ms: Option<Percentiles>,
+    pub shading_only_ms: Option<Percentiles>,
     /// Every frame of the path in order, milliseconds: the times of which `frame_ms` tells.
     #[serde(default)]
     pub frames_ms: Vec<f64>,
     /// The floors of the same frames; empty if they were not measured.
     #[serde(default)]
-    pub floors_ms: Vec<f64>,
+    pub shading_only_frames_ms: Vec<f64>,
     /// Frames of more than twice the median.
     pub hitches: usize,
     /// Triangles drawn a frame.
@@ -174,17 +174,17 @@ pub struct Times {
     /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
     /// kept.
     #[serde(with = "extended", default = "kept")]
-    pub widening: f64,
+    pub tolerance_scale: f64,
     /// Instances in sight that were coarser than the tolerance allows because what is finer was not there yet, the most
     /// of any frame.
     #[serde(default)]
-    pub waiting: u64,
+    pub pending: u64,
     /// Frames with such instances.
     #[serde(default)]
-    pub waiting_frames: usize,
+    pub pending_frames: usize,
     /// How well the goal was held, if there is one.
     #[serde(default)]
-    pub held: Option<Held>,
+    pub budget: Option<BudgetStats>,
     /// The tolerances of the frames, pixels, if there is a goal.
     #[serde(default)]
     pub tolerances_px: Vec<f64>,
@@ -192,7 +192,7 @@ pub struct Times {
     pub device_bytes: BTreeMap<String, u64>,
     /// What the technique told of itself after the last frame, by name.
     #[serde(default)]
-    pub figures: BTreeMap<String, f64>,
+    pub stats: BTreeMap<String, f64>,
     /// The most memory that the process has held, bytes.
     pub host_bytes: Option<u64>,
 }
@@ -246,12 +246,12 @@ pub struct Errors {
     pub worst: Option<Worst>,
     /// What is beyond the tolerance because something finer was not there yet.
     #[serde(default)]
-    pub waiting: Option<Waiting>,
+    pub pending: Option<PendingFrames>,
 }
 
 /// Frames in which a refinement waited, counted apart: only there may a certified bound be exceeded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Waiting {
+pub struct PendingFrames {
     /// Such frames, of those measured.
     pub frames: usize,
     /// Those of them that kept the tolerance all the same.

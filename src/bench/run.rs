@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, ensure};
 
-use super::held::{Goal, Held};
+use super::goal::{BudgetStats, Goal};
 use super::journal::Journal;
 use super::machine::host_bytes;
 use super::paths::{self, Pose};
@@ -23,12 +23,12 @@ use crate::view::{Metric, Tolerance, View};
 const HITCH: f64 = 2.0;
 
 /// One case as a laboratory gets it.
-pub struct Scene<'a> {
+pub struct BenchScene<'a> {
     /// What is drawn and how.
     pub case: &'a Case,
     /// The field.
     pub field: &'a Arc<Field>,
-    /// A view a frame, in order, under the case's tolerance; a goal moves it ([`Helm`](super::held::Helm)).
+    /// A view a frame, in order, under the case's tolerance; a goal moves it ([`ToleranceController`](super::held::Helm)).
     pub views: &'a [View],
     /// The folder for pictures: file names in [`Errors`] are relative to it.
     pub folder: &'a Path,
@@ -36,7 +36,7 @@ pub struct Scene<'a> {
 
 /// What one frame took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Frame {
+pub struct FrameSample {
     /// From the start of selection until the picture is done, milliseconds.
     pub frame_ms: f64,
     /// Selection, milliseconds.
@@ -48,7 +48,7 @@ pub struct Frame {
     /// Copying to the device, milliseconds.
     pub upload_ms: Option<f64>,
     /// The same pose with the same fragment work in one full-screen pass, milliseconds.
-    pub floor_ms: Option<f64>,
+    pub shading_only_ms: Option<f64>,
     /// Triangles drawn.
     pub triangles: u64,
     /// Vertices run.
@@ -58,9 +58,9 @@ pub struct Frame {
     /// Draw commands recorded.
     pub commands: u64,
     /// What the tolerance was multiplied by: 1 where it was kept.
-    pub widening: f64,
+    pub tolerance_scale: f64,
     /// Instances in sight whose refinement waited.
-    pub waiting: u64,
+    pub pending: u64,
     /// Error allowed, pixels.
     pub tolerance_px: f64,
 }
@@ -69,23 +69,23 @@ pub struct Frame {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timed {
     /// One a view.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<FrameSample>,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
     /// What the technique tells of itself at the end, by name.
-    pub figures: BTreeMap<String, f64>,
+    pub stats: BTreeMap<String, f64>,
 }
 
 /// Whoever draws. A laboratory may keep what it made for a scene; it is called for the scenes in turn.
-pub trait Laboratory {
+pub trait BenchBackend {
     /// The device, and the plan of each terrain's scene.
     fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)>;
 
     /// Draws every view once, in order, beginning with the technique as it is when it has just been made.
-    fn time(&mut self, scene: &Scene) -> Result<Timed>;
+    fn time(&mut self, scene: &BenchScene) -> Result<Timed>;
 
     /// Draws every view once, in order, and measures the frames 0, [`Case::every`], 2 · [`Case::every`], …
-    fn measure(&mut self, scene: &Scene) -> Result<Errors>;
+    fn measure(&mut self, scene: &BenchScene) -> Result<Errors>;
 
     /// Ends it: what the validation layers have said, if they were asked.
     fn close(self: Box<Self>) -> Vec<String> {
@@ -136,9 +136,9 @@ struct Task<'a> {
 
 impl Run<'_> {
     /// Runs what is not there yet and writes the results, also when stopped or when a case fails.
-    pub fn run(&self, laboratory: &mut dyn Laboratory, header: Header, at: &mut dyn FnMut(Step)) -> Result<Ended> {
+    pub fn run(&self, backend: &mut dyn BenchBackend, header: Header, at: &mut dyn FnMut(Step)) -> Result<Ended> {
         let mut journal = Journal::open(self.folder, header)?;
-        let ended = self.missing_rows(laboratory, &mut journal, at);
+        let ended = self.missing_rows(backend, &mut journal, at);
         let written = results::write(self.folder);
         // The first failure is the one to tell of.
         let ended = ended?;
@@ -148,7 +148,7 @@ impl Run<'_> {
 
     fn missing_rows(
         &self,
-        laboratory: &mut dyn Laboratory,
+        backend: &mut dyn BenchBackend,
         journal: &mut Journal,
         at: &mut dyn FnMut(Step),
     ) -> Result<Ended> {
@@ -162,7 +162,7 @@ impl Run<'_> {
                 return Ok(Ended::Stopped);
             }
             at(Step { done: [k, tasks.len()], case: task.case });
-            let row = self.row(laboratory, &mut flights, *task);
+            let row = self.row(backend, &mut flights, *task);
             let row = row.with_context(|| format!("{}: {}", self.kept(journal), task.case))?;
             journal.append(row).with_context(|| self.kept(journal))?;
         }
@@ -188,18 +188,18 @@ impl Run<'_> {
         scenes.iter().flat_map(of_scene).collect()
     }
 
-    fn row(&self, laboratory: &mut dyn Laboratory, flights: &mut Flights, task: Task) -> Result<Row> {
+    fn row(&self, backend: &mut dyn BenchBackend, flights: &mut Flights, task: Task) -> Result<Row> {
         let case = task.case;
         let (_, field) = self.fields.iter().find(|(terrain, _)| *terrain == case.terrain).context("no such terrain")?;
         let views = flights.views(case, field)?;
         let Some(round) = task.round else {
-            let scene = Scene { case, field, views: &views, folder: self.folder };
-            return Ok(Row::Error(ErrorRow { case: case.clone(), errors: laboratory.measure(&scene)? }));
+            let scene = BenchScene { case, field, views: &views, folder: self.folder };
+            return Ok(Row::Error(ErrorRow { case: case.clone(), errors: backend.measure(&scene)? }));
         };
         let first = views.first().context("a path has at least one frame")?;
         let views: Vec<View> = std::iter::repeat_n(*first, self.warm_up).chain(views.iter().copied()).collect();
-        let scene = Scene { case, field, views: &views, folder: self.folder };
-        let mut timed = laboratory.time(&scene)?;
+        let scene = BenchScene { case, field, views: &views, folder: self.folder };
+        let mut timed = backend.time(&scene)?;
         let (found, expected) = (timed.frames.len(), views.len());
         ensure!(found == expected, "{found} frames were timed of {expected}");
         timed.frames.drain(..self.warm_up);
@@ -252,11 +252,11 @@ impl Times {
     /// Sums one round's frames up.
     pub fn of(round: usize, timed: Timed, goal: Option<Goal>) -> Self {
         let frames = &timed.frames;
-        let times = |of: fn(&Frame) -> f64| Percentiles::of(frames.iter().map(of));
-        let measured = |of: fn(&Frame) -> Option<f64>| -> Option<Percentiles> {
+        let times = |of: fn(&FrameSample) -> f64| Percentiles::of(frames.iter().map(of));
+        let measured = |of: fn(&FrameSample) -> Option<f64>| -> Option<Percentiles> {
             frames.iter().map(of).collect::<Option<Vec<_>>>().map(Percentiles::of)
         };
-        let counts = |of: fn(&Frame) -> u64| Spread::of(frames.iter().map(|frame| of(frame) as f64));
+        let counts = |of: fn(&FrameSample) -> u64| Spread::of(frames.iter().map(|frame| of(frame) as f64));
         let frame_ms = times(|frame| frame.frame_ms);
         let vertices: Option<Vec<f64>> = frames.iter().map(|frame| frame.vertices.map(|n| n as f64)).collect();
         Self {
@@ -266,21 +266,21 @@ impl Times {
             record_ms: times(|frame| frame.record_ms),
             gpu_ms: measured(|frame| frame.gpu_ms),
             upload_ms: measured(|frame| frame.upload_ms),
-            floor_ms: measured(|frame| frame.floor_ms),
+            shading_only_ms: measured(|frame| frame.shading_only_ms),
             frames_ms: frames.iter().map(|frame| whole_us(frame.frame_ms)).collect(),
-            floors_ms: frames.iter().filter_map(|frame| frame.floor_ms).map(whole_us).collect(),
+            shading_only_frames_ms: frames.iter().filter_map(|frame| frame.shading_only_ms).map(whole_us).collect(),
             hitches: frames.iter().filter(|frame| frame.frame_ms > HITCH * frame_ms.p50).count(),
             triangles: counts(|frame| frame.triangles),
             vertices: vertices.map(Spread::of),
             draws: counts(|frame| frame.draws),
             commands: counts(|frame| frame.commands),
-            widening: frames.iter().map(|frame| frame.widening).fold(1.0, f64::max),
-            waiting: frames.iter().map(|frame| frame.waiting).max().unwrap_or(0),
-            waiting_frames: frames.iter().filter(|frame| frame.waiting > 0).count(),
-            held: goal.map(|goal| Held::of(goal, frames)),
+            tolerance_scale: frames.iter().map(|frame| frame.tolerance_scale).fold(1.0, f64::max),
+            pending: frames.iter().map(|frame| frame.pending).max().unwrap_or(0),
+            pending_frames: frames.iter().filter(|frame| frame.pending > 0).count(),
+            budget: goal.map(|goal| BudgetStats::of(goal, frames)),
             tolerances_px: frames.iter().filter(|_| goal.is_some()).map(|frame| frame.tolerance_px).collect(),
             device_bytes: timed.device_bytes,
-            figures: timed.figures,
+            stats: timed.stats,
             host_bytes: host_bytes(),
         }
     }

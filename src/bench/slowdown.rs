@@ -12,7 +12,7 @@ use super::statistics::{Estimate, middle, percentile, sorted};
 /// Draws of the bootstrap.
 const RESAMPLES: usize = 1000;
 /// Fewer rounds tell nothing of the noise.
-pub const LEAST_ROUNDS: usize = 3;
+pub const MIN_ROUNDS: usize = 3;
 
 /// One case in both runs.
 pub type Pair<'a> = (&'a CaseResult, &'a CaseResult);
@@ -21,16 +21,18 @@ pub type Pair<'a> = (&'a CaseResult, &'a CaseResult);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
     /// Its time.
-    Frame,
+    FrameSample,
     /// The time of its floor: shading alone, and how fast the machine was.
-    Floor,
+    ShadingOnly,
     /// Its time over its floor's.
-    OverFloor,
+    OverShadingOnly,
 }
 
 /// Whether the rounds of a case have a floor for every frame.
-pub fn has_floors(case: &CaseResult) -> bool {
-    case.rounds.iter().all(|round| !round.frames_ms.is_empty() && round.floors_ms.len() == round.frames_ms.len())
+pub fn has_shading_only(case: &CaseResult) -> bool {
+    case.rounds
+        .iter()
+        .all(|round| !round.frames_ms.is_empty() && round.shading_only_frames_ms.len() == round.frames_ms.len())
 }
 
 /// The cost of the second run over that of the first, all these cases together, and the interval that leaves a share
@@ -56,11 +58,15 @@ fn median_ratio(pairs: &[Pair], cost: Cost, [a, b]: [&[usize]; 2]) -> f64 {
 
 fn costs(case: &CaseResult, cost: Cost, rounds: &[usize]) -> Vec<f64> {
     match cost {
-        Cost::Frame => shortest(case, rounds, frames_ms),
-        Cost::Floor => shortest(case, rounds, |round| &round.floors_ms),
-        Cost::OverFloor => {
-            let floors = shortest(case, rounds, |round| &round.floors_ms);
-            shortest(case, rounds, frames_ms).into_iter().zip(floors).map(|(frame, floor)| frame / floor).collect()
+        Cost::FrameSample => shortest(case, rounds, frames_ms),
+        Cost::ShadingOnly => shortest(case, rounds, |round| &round.shading_only_frames_ms),
+        Cost::OverShadingOnly => {
+            let shading_only = shortest(case, rounds, |round| &round.shading_only_frames_ms);
+            shortest(case, rounds, frames_ms)
+                .into_iter()
+                .zip(shading_only)
+                .map(|(frame, shading_only)| frame / shading_only)
+                .collect()
         }
     }
 }
@@ -75,7 +81,7 @@ fn shortest(case: &CaseResult, rounds: &[usize], times: fn(&Times) -> &[f64]) ->
     let mut of_rounds = rounds.iter().map(|&k| times(&case.rounds[k % case.rounds.len()]));
     let mut shortest = of_rounds.next().unwrap_or_default().to_vec();
     for round in of_rounds {
-        shortest.iter_mut().zip(round).for_each(|(least, &ms)| *least = least.min(ms));
+        shortest.iter_mut().zip(round).for_each(|(min, &ms)| *min = min.min(ms));
     }
     shortest
 }

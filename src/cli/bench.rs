@@ -15,7 +15,7 @@ use crate::bench::compare::{THRESHOLD, compare};
 use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
 use crate::bench::run::{Ended, Run};
-use crate::bench::{Laboratory, SCHEMA};
+use crate::bench::{BenchBackend, SCHEMA};
 use crate::plan::Look;
 
 /// Arguments.
@@ -131,23 +131,23 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
     Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Makes what draws. Every [`Scene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
+/// Makes what draws. Every [`BenchScene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
 #[cfg(feature = "vulkan")]
-fn laboratory(common: &Common, look: Look) -> Result<Box<dyn Laboratory>> {
+fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
     let gpu = super::render::open(common, false)?;
-    Ok(Box::new(crate::bench::device::DeviceLaboratory::new(gpu, look)))
+    Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look)))
 }
 
 #[cfg(not(feature = "vulkan"))]
-fn laboratory(_common: &Common, _look: Look) -> Result<Box<dyn Laboratory>> {
+fn backend(_common: &Common, _look: Look) -> Result<Box<dyn BenchBackend>> {
     anyhow::bail!("bench: built without Vulkan; `report` and `bench compare` work without it")
 }
 
 fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let folder = args.out.as_deref().context("--out DIR is missing")?;
     let planned = Planned::new(common, args)?;
-    let mut laboratory = laboratory(common, args.ground.over(Look::default())?)?;
-    let header = header(laboratory.as_mut(), &planned)?;
+    let mut backend = backend(common, args.ground.over(Look::default())?)?;
+    let header = header(backend.as_mut(), &planned)?;
     // The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
     let stop = interrupt::flag();
     let run = Run {
@@ -159,7 +159,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         stop: &stop,
     };
     let bar = progress(common);
-    let ended = run.run(laboratory.as_mut(), header, &mut |step| {
+    let ended = run.run(backend.as_mut(), header, &mut |step| {
         bar.set_length(step.done[1] as u64);
         bar.set_position(step.done[0] as u64);
         bar.set_message(step.case.to_string());
@@ -175,14 +175,14 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         report::warn(common, "stopped; the same command goes on where it was");
     }
     let (results, page) = (folder.join(RESULTS).display().to_string(), page.display().to_string());
-    let messages = laboratory.close();
+    let messages = backend.close();
     let is_missed = !complete || found.cases.iter().any(CaseResult::is_torn) || !messages.is_empty();
     report::print(common, &Done { results, report: page, rows, complete, validation_messages: messages })?;
     Ok(if is_missed { Outcome::LimitMissed } else { Outcome::Done })
 }
 
-fn header(laboratory: &mut dyn Laboratory, planned: &Planned) -> Result<Header> {
-    let (device, plans) = laboratory.describe(&planned.fields)?;
+fn header(backend: &mut dyn BenchBackend, planned: &Planned) -> Result<Header> {
+    let (device, plans) = backend.describe(&planned.fields)?;
     Ok(Header {
         schema: SCHEMA,
         program: env!("CARGO_PKG_VERSION").to_string(),

@@ -9,7 +9,7 @@ use clap::ValueEnum;
 
 use super::bench::MeasureArgs;
 use super::{Common, endless, report};
-use crate::bench::held::Goal;
+use crate::bench::goal::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
 use crate::lod;

@@ -16,7 +16,7 @@ pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
         None => return None,
         Some(seed) => seed.parse().map_err(|_| anyhow!("{terrain}: seed: expected a number of 0 or more")),
     };
-    Some(seed.and_then(|seed| land(terrain, seed, options)))
+    Some(seed.and_then(|seed| endless(terrain, seed, options)))
 }
 
 /// Whether this is [`named`] so.
@@ -25,7 +25,7 @@ pub fn is_named(terrain: &str) -> bool {
 }
 
 /// It is not read from a file, and nothing can be said about how.
-fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
+fn endless(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     let Options { max_samples, hole_fill, .. } = *options;
     if *options != (Options { max_samples, hole_fill, ..Options::default() }) {
         bail!("{terrain}: it is worked out as it is looked at: it has no samples to space, scale, crop or repeat");
@@ -45,7 +45,7 @@ fn land(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
 
 /// Refuses a land without samples for what looks at every sample.
 pub fn need_samples(field: &Field, what: &str) -> Result<()> {
-    if field.land().is_some() {
+    if field.procedural().is_some() {
         bail!("{what}: it looks at every sample, and this land has none");
     }
     Ok(())

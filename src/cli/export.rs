@@ -66,7 +66,7 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     let mut technique = args.technique.build(common, &field)?;
     let mut list = DrawList::default();
     technique.select(&view, &mut list);
-    report::warn_of_tolerance(common, list.widening);
+    report::warn_of_tolerance(common, list.tolerance_scale);
     let mut mesh = MeshBuilder::new(&field, list.fraction_bits);
     let frame = Frame::placing(&field, &view);
     expand::visit_triangles(&field, &frame, technique.resident(), &list, |t| mesh.add(&t.corners));

@@ -85,7 +85,7 @@ pub enum Command {
     View(view::ViewerArgs),
     /// Error against run time: every technique at every tolerance along named paths.
     Bench(bench::BenchArgs),
-    /// The stability battery: every technique on stiff and extreme cases.
+    /// The stability suite: every technique on stiff and extreme cases.
     Stress(stress::StressArgs),
     /// The report of a benchmark, drawn again from its rows.
     Report(redraw::ReportArgs),

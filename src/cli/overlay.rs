@@ -10,7 +10,7 @@ use crate::height::{Error, Field, Footprint, Located, Place, demo, place_of};
 use crate::texture::drape::Drape;
 
 /// The most texels of a picture, as of samples by default.
-const MOST_TEXELS: u64 = 1 << 30;
+const MAX_TEXELS: u64 = 1 << 30;
 
 /// A picture, north up, and where its file says that it lies.
 pub struct Picture {
@@ -32,7 +32,7 @@ impl Picture {
             image::ImageReader::open(path).map_err(|e| fail(&e))?.with_guessed_format().map_err(|e| fail(&e))?;
         let mut decoder = reader.into_decoder().map_err(|e| fail(&e))?;
         let (width, height) = decoder.dimensions();
-        if u64::from(width) * u64::from(height) > MOST_TEXELS {
+        if u64::from(width) * u64::from(height) > MAX_TEXELS {
             return Err(fail(&format!("expected at most 2^30 texels, found {width}x{height}")).into());
         }
         // The texels are counted: bytes need no limit of their own.

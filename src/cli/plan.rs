@@ -20,8 +20,8 @@ struct Plan {
     kept: Vec<Decision>,
     left_out: Vec<LeftOut>,
     /// What the technique did not prepare for this field.
-    spared: Vec<Unprepared>,
-    figures: Vec<Figure>,
+    omitted: Vec<Unprepared>,
+    stats: Vec<Figure>,
     /// All that is kept, measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole>,
@@ -78,7 +78,7 @@ pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> R
     let (entry, _) = args.technique.settings()?;
     let technique = args.technique.build(common, field)?;
     let (plan, savings) = plan(common, args, (field, &look, overlay.as_ref()), technique.as_ref())?;
-    let (kept, left_out) = plan.decisions(field, Some(&technique.kept()));
+    let (kept, left_out) = plan.decisions(field, Some(&technique.device_geometry()));
     let (whole, mut savings) = savings.unzip();
     let mut left_out: Vec<_> = left_out.into_iter().map(LeftOut::from).collect();
     for (feature, bytes, saved) in savings.take().into_iter().flatten() {
@@ -86,10 +86,10 @@ pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> R
             (decision.bytes_saved, decision.measured) = (bytes, Some(saved));
         }
     }
-    let figures = technique.figures().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
-    let spared = technique.spared().into_iter();
-    let spared = spared.map(|s| Unprepared { what: s.what, reason: s.reason, bytes_saved: s.bytes }).collect();
-    report::print(common, &Plan { technique: entry.name, kept, left_out, spared, figures, whole })?;
+    let stats = technique.stats().into_iter().map(|(name, value, unit)| Figure { name, value, unit }).collect();
+    let omitted = technique.omitted().into_iter();
+    let omitted = omitted.map(|s| Unprepared { what: s.what, reason: s.reason, bytes_saved: s.bytes }).collect();
+    report::print(common, &Plan { technique: entry.name, kept, left_out, omitted, stats, whole })?;
     Ok(Outcome::Done)
 }
 
@@ -118,7 +118,7 @@ fn plan(
     let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
     let plan = ScenePlan::new(field, look, &limits).map_err(anyhow::Error::msg)?;
     let plan = plan.with_overlay(field, look, &limits, picture).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_manner(technique.manner());
+    let plan = plan.with_requirements(technique.pipeline_requirements());
     let Some(frames) = args.measure else {
         return Ok((plan, None));
     };
@@ -154,5 +154,5 @@ fn plan(
     let plan = ScenePlan::new(field, look, &device).map_err(anyhow::Error::msg)?;
     let picture = overlay.map(|picture| picture.dimensions().into());
     let plan = plan.with_overlay(field, look, &device, picture).map_err(anyhow::Error::msg)?;
-    Ok((plan.with_manner(technique.manner()), None))
+    Ok((plan.with_requirements(technique.pipeline_requirements()), None))
 }

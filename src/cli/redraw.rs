@@ -1,4 +1,4 @@
-//! `cuesta report`: draws the report of a benchmark or of a stability battery again, from its rows alone.
+//! `cuesta report`: draws the report of a benchmark or of a stability suite again, from its rows alone.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::stress::rows;
 /// Arguments.
 #[derive(Args, Debug)]
 pub struct ReportArgs {
-    /// Directory of a benchmark or of a stability battery.
+    /// Directory of a benchmark or of a stability suite.
     pub folder: PathBuf,
 }
 
@@ -25,10 +25,10 @@ struct Redrawn {
 
 /// Runs the subcommand.
 pub fn run(common: &Common, args: &ReportArgs) -> Result<Outcome> {
-    let battery = args.folder.join(rows::FILE);
-    if battery.exists() {
+    let suite = args.folder.join(rows::FILE);
+    if suite.exists() {
         let report = crate::report::write_stress(&args.folder)?.display().to_string();
-        report::print(common, &Redrawn { report, results: battery.display().to_string() })?;
+        report::print(common, &Redrawn { report, results: suite.display().to_string() })?;
         return Ok(Outcome::Done);
     }
     let results = results::write(&args.folder)?.display().to_string();

@@ -21,8 +21,8 @@ use crate::measure::geometric::{self, Summary};
 use crate::measure::watertight;
 use crate::plan::ScenePlan;
 use crate::scene::holes::{Truth, skirts};
-use crate::scene::{Scene, Shot};
-use crate::texture::picture_maps;
+use crate::scene::{RenderResult, Scene};
+use crate::texture::virtual_overlay;
 use crate::view::{Metric, View};
 
 /// Arguments.
@@ -69,7 +69,7 @@ struct Rendered {
     levels: Vec<usize>,
     /// What the tolerance was multiplied by because there was too much to draw: 1 where it was kept.
     #[serde(serialize_with = "extended::serialize")]
-    widening: f64,
+    tolerance_scale: f64,
     prepare_ms: f64,
     select_ms: f64,
     record_ms: f64,
@@ -77,7 +77,7 @@ struct Rendered {
     device_bytes: u64,
     /// What is there of a picture laid over that exceeds the memory for it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    texture_maps: Option<picture_maps::Figures>,
+    texture_maps: Option<virtual_overlay::VirtualTextureStats>,
     validation_messages: Vec<String>,
     #[serde(flatten)]
     measured: Option<Measured>,
@@ -150,18 +150,18 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
     let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
     let plan = plan.with_overlay(&field, &look, &gpu.device_limits(), picture).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_manner(technique.manner());
+    let plan = plan.with_requirements(technique.pipeline_requirements());
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
-    let shot = scene.shoot(technique.as_mut(), &view, args.repeat)?;
-    report::save(&args.output, &shot.picture)?;
-    report::warn_of_tolerance(common, shot.list.widening);
-    let measured = if args.measure { Some(measure(&scene, technique.as_ref(), &view, &shot)?) } else { None };
+    let rendered = scene.render(technique.as_mut(), &view, args.repeat)?;
+    report::save(&args.output, &rendered.picture)?;
+    report::warn_of_tolerance(common, rendered.list.tolerance_scale);
+    let measured = if args.measure { Some(measure(&scene, technique.as_ref(), &view, &rendered)?) } else { None };
     let device = gpu.candidate.name.clone();
     let messages = Gpu::close(gpu);
     let missed = measured.as_ref().is_some_and(|m| {
         let over = technique.keeps_tolerance()
             && view.tolerance.metric == Metric::Certified
-            && (m.error_px.max > view.tolerance.px || shot.list.widening > 1.0);
+            && (m.error_px.max > view.tolerance.px || rendered.list.tolerance_scale > 1.0);
         over || m.hole_pixels > 0 || !m.watertight
     });
     let rendered = Rendered {
@@ -170,19 +170,19 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         tolerance_px: view.tolerance.px,
         size: view.size,
         device,
-        triangles: shot.list.triangles(),
-        vertices: shot.times.gpu.statistics.map(|s| s[0]),
-        draws: shot.list.draws.len(),
-        commands: shot.list.commands(),
-        batches: shot.list.draws.len(),
-        levels: shot.list.levels(),
-        widening: shot.list.widening,
+        triangles: rendered.list.triangles(),
+        vertices: rendered.times.gpu.statistics.map(|s| s[0]),
+        draws: rendered.list.draws.len(),
+        commands: rendered.list.commands(),
+        batches: rendered.list.draws.len(),
+        levels: rendered.list.levels(),
+        tolerance_scale: rendered.list.tolerance_scale,
         prepare_ms,
-        select_ms: shot.times.select_ms,
-        record_ms: shot.times.record_ms,
-        gpu_ms: shot.times.gpu.total_ms,
-        device_bytes: shot.device_bytes,
-        texture_maps: shot.maps,
+        select_ms: rendered.times.select_ms,
+        record_ms: rendered.times.record_ms,
+        gpu_ms: rendered.times.gpu.total_ms,
+        device_bytes: rendered.device_bytes,
+        texture_maps: rendered.maps,
         validation_messages: messages.clone(),
         measured,
     };
@@ -194,18 +194,24 @@ fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-fn measure(scene: &Scene, technique: &dyn Technique, view: &View, shot: &Shot) -> Result<Measured> {
-    let errors = geometric::errors(scene.field, view, technique.resident(), &shot.list);
-    let proof = watertight::prove_list(scene.field, view, technique.manner().seams, technique.resident(), &shot.list);
-    let holes = Truth::new(scene, view)?.hole_pixels(scene, view, &shot.picture)?;
+fn measure(scene: &Scene, technique: &dyn Technique, view: &View, rendered: &RenderResult) -> Result<Measured> {
+    let errors = geometric::errors(scene.field, view, technique.resident(), &rendered.list);
+    let proof = watertight::prove_list(
+        scene.field,
+        view,
+        technique.pipeline_requirements().seams,
+        technique.resident(),
+        &rendered.list,
+    );
+    let holes = Truth::new(scene, view)?.hole_pixels(scene, view, &rendered.picture)?;
     let (width, frame) = (view.size[0] as usize, Frame::placing(scene.field, view));
     Ok(Measured {
         error_px: errors.screen_px.into(),
         error_m: errors.vertical_m.into(),
         hole_pixels: holes.len(),
         hole_pixels_at: holes.iter().take(8).map(|k| [k % width, k / width]).collect(),
-        skirt_pixels: skirts(&shot.picture).into_iter().filter(|&is| is).count(),
-        skirt_triangles: expand::skirts(scene.field, &frame, technique.resident(), &shot.list).len(),
+        skirt_pixels: skirts(&rendered.picture).into_iter().filter(|&is| is).count(),
+        skirt_triangles: expand::skirts(scene.field, &frame, technique.resident(), &rendered.list).len(),
         watertight: proof.is_ok(),
         counter_example: proof.err().map(|e| e.to_string()),
     })

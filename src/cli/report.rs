@@ -16,6 +16,7 @@ use crate::height::Error;
 use crate::height::progress::Progress;
 use crate::height::save::replace;
 use crate::lod::{Entry, Settings};
+use crate::renamed;
 
 /// A line on stdout.
 ///
@@ -35,8 +36,9 @@ pub fn note(line: impl fmt::Display) {
 
 /// Prints a result: as one JSON document, or one line a field.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
-    let value = serde_json::to_value(result)?;
+    let mut value = serde_json::to_value(result)?;
     if common.json {
+        renamed::add_former_names(&mut value);
         say(serde_json::to_string_pretty(&value)?)?;
     } else if let (Value::Object(fields), false) = (value, common.quiet) {
         for (name, value) in fields.iter().filter(|(_, value)| !value.is_null()) {

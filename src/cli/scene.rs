@@ -257,8 +257,8 @@ impl ReadArgs {
             max_samples: self.max_samples,
         };
         let only = several::only(terrain)?;
-        if let Some(land) = only.and_then(|only| endless::named(only, &options)) {
-            return land;
+        if let Some(terrain) = only.and_then(|only| endless::named(only, &options)) {
+            return terrain;
         }
         let _spinner = report::spinner(common, format!("reading {}", terrain.join(" ")));
         let is_demo = only.is_some_and(is_demo);

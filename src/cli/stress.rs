@@ -1,4 +1,4 @@
-//! `cuesta stress`: the stability battery.
+//! `cuesta stress`: the stability suite.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::{Common, Outcome, interrupt, report};
 use crate::height::save::replace;
-use crate::stress::{self, Case, Eye, Finding, Kind, Row, SCHEMA, Stress, Trial, jitter, rows, saved, stiff};
+use crate::stress::{self, Case, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, Trial, jitter, rows, saved, stiff};
 
 /// Where counter-examples go if nothing else is said.
 const FOLDER: &str = "cuesta-stress";
@@ -100,7 +100,7 @@ fn progress(common: &Common, trials: &[Trial], draws: bool) -> ProgressBar {
     bar
 }
 
-fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Row {
+fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn ImageChecker>) -> Row {
     let finite = |value: f64| value.is_finite().then_some(value);
     // A row is worth more than its counter-example.
     let files = counter_example(folder, trial, finding, eye).unwrap_or_else(|error| {
@@ -115,13 +115,18 @@ fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Op
         value: finite(finding.value),
         limit: finding.limit.and_then(finite),
         pass: finding.passes(),
-        why: finding.broken.as_ref().map(ToString::to_string).or_else(|| finding.why.clone()),
+        why: finding.violation.as_ref().map(ToString::to_string).or_else(|| finding.why.clone()),
         repeat: saved::command(trial),
         saved: files.iter().map(|file| file.display().to_string()).collect(),
     }
 }
 
-fn counter_example(folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn Eye>) -> Result<Vec<PathBuf>> {
+fn counter_example(
+    folder: &Path,
+    trial: &Trial,
+    finding: &Finding,
+    eye: Option<&mut dyn ImageChecker>,
+) -> Result<Vec<PathBuf>> {
     if finding.passes() {
         return Ok(Vec::new());
     }
@@ -181,7 +186,7 @@ fn line(row: &Row) -> String {
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
     };
     let verdict = match (row.limit, row.pass) {
-        (None, true) => "told",
+        (None, true) => "info",
         (_, true) => "pass",
         (_, false) => "FAIL",
     };
@@ -192,7 +197,7 @@ fn line(row: &Row) -> String {
 
 /// The device that draws, if there is one and it is wanted.
 #[cfg(feature = "vulkan")]
-struct Device(Option<(String, stress::device::DeviceEye)>);
+struct Device(Option<(String, stress::device::DeviceImageChecker)>);
 
 #[cfg(feature = "vulkan")]
 impl Device {
@@ -203,7 +208,7 @@ impl Device {
         match super::render::open(common, false) {
             Ok(gpu) => {
                 let name = gpu.candidate.name.clone();
-                Ok(Self(Some((name, stress::device::DeviceEye::new(gpu)))))
+                Ok(Self(Some((name, stress::device::DeviceImageChecker::new(gpu)))))
             }
             Err(error) if common.device.is_some() || common.validate => Err(error),
             Err(error) => {
@@ -213,8 +218,8 @@ impl Device {
         }
     }
 
-    fn eye(&mut self) -> Option<&mut dyn Eye> {
-        self.0.as_mut().map(|(_, eye)| eye as &mut dyn Eye)
+    fn eye(&mut self) -> Option<&mut dyn ImageChecker> {
+        self.0.as_mut().map(|(_, eye)| eye as &mut dyn ImageChecker)
     }
 
     /// Its name, and validation messages.
@@ -233,7 +238,7 @@ impl Device {
         Ok(Self)
     }
 
-    fn eye(&mut self) -> Option<&mut dyn Eye> {
+    fn eye(&mut self) -> Option<&mut dyn ImageChecker> {
         None
     }
 

@@ -10,8 +10,8 @@ use super::report::save;
 use crate::draw::DrawList;
 use crate::height::{Error, Field};
 use crate::lod::Technique;
-use crate::texture::ground_maps::{GroundCut, GroundSet, MOST_SLOTS, SLOT_LEVEL};
 use crate::texture::resolution::texture_area;
+use crate::texture::virtual_ground::{GroundSet, MAX_SLOTS, SLOT_LEVEL, VirtualGroundLayout};
 use crate::texture::wedges;
 use crate::texture::working_set::{Node, WorkingSet};
 use crate::view::View;
@@ -55,7 +55,7 @@ pub fn draw(
 ) -> Result<Needed> {
     let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
     ensure!(is_png, Error::new(path.display().to_string(), "extension", "expected .png"));
-    let cut = GroundCut::new(field, texture_bytes, MOST_SLOTS as u32).map_err(anyhow::Error::msg)?;
+    let cut = VirtualGroundLayout::new(field, texture_bytes, MAX_SLOTS as u32).map_err(anyhow::Error::msg)?;
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let wedges = wedges::of_list(field, view, technique.resident(), &list);
@@ -75,7 +75,7 @@ pub fn draw(
         wedges: wedges.len(),
         nodes: set.nodes().count(),
         slots: cut.slots,
-        bytes: set.nodes().count() as u64 * GroundCut::tile_bytes(),
+        bytes: set.nodes().count() as u64 * VirtualGroundLayout::tile_bytes(),
         texel_px: needed.texel_px(),
         texels: set.texels(),
         texels_a_pixel: set.texels() / f64::from(view.size[0]) / f64::from(view.size[1]),

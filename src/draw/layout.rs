@@ -51,13 +51,13 @@ shared! {
         clip_from_relative: mat4,
         /// The lattice position nearest the eye: positions are integer differences to it, so that nothing
         /// large is ever rounded.
-        anchor: ivec2,
+        render_origin: ivec2,
         /// Where the anchor lies relative to the eye (x, z), metres.
-        anchor_relative: vec2,
+        render_origin_relative: vec2,
         /// A height near the eye's, metres, that vertices subtract before anything else.
-        anchor_height: float,
+        render_origin_height: float,
         /// Where that height lies relative to the eye (y), metres.
-        anchor_height_relative: float,
+        render_origin_height_relative: float,
         /// Distance of neighbouring samples (x, z), metres.
         spacing: vec2,
         /// The last sample of the field, tiling included.
@@ -65,7 +65,7 @@ shared! {
         /// Samples stored (x, z): a tiled field repeats after them.
         stored: ivec2,
         /// The anchor, where it is far away back by whole repetitions: there a float has no parts of samples left.
-        anchor_stored: ivec2,
+        render_origin_stored: ivec2,
         /// Height = (stored code − zero) · scale, metres.
         height_zero: float,
         /// See `height_zero`.
@@ -109,7 +109,7 @@ shared! {
         /// Samples per mesh unit, as a power of two; −1: two units a sample, and odd positions do not occur.
         shift: int,
         /// Quarter turns about the mesh's centre, 0–3.
-        turns: uint,
+        rotation: uint,
         /// Level of detail, 0 the finest: for morphing, colouring and counting.
         level: uint,
         /// Which batch drew it: for colouring.
@@ -133,7 +133,7 @@ shared! {
         /// Height of the coarser shape (morph weight 1), metres.
         target: float,
         /// Where the target itself goes with the second region's weight, metres.
-        further: float,
+        second_target: float,
         /// Morph weight, 0 the finer shape and 1 the coarser one, where no region says it.
         morph: float,
         /// Regions of the instance's weights, a byte each: of the vertex, and of its target (0: none). See
@@ -148,7 +148,7 @@ shared! {
         /// Of the coarser shape.
         target: uint,
         /// Of that to which the target goes itself.
-        further: uint,
+        second_target: uint,
     }
 
     /// What the vertex program made of a vertex, when it is captured.
@@ -190,13 +190,13 @@ shared! {
     /// What a view says about the nodes of clusters (`lod::clusters`), in single precision and relative to the eye.
     struct ClusterView {
         /// As in `Frame`.
-        anchor: ivec2,
+        render_origin: ivec2,
         /// As in `Frame`, metres.
-        anchor_relative: vec2,
+        render_origin_relative: vec2,
         /// As in `Frame`, metres.
-        anchor_height: float,
+        render_origin_height: float,
         /// As in `Frame`, metres.
-        anchor_height_relative: float,
+        render_origin_height_relative: float,
         /// Distance of neighbouring samples (x, z), metres.
         spacing: vec2,
         /// Planes around what can be seen: normal · p + w ≥ 0 inside.
@@ -250,7 +250,7 @@ shared! {
         /// are not.
         skirts: uint,
         /// The most nodes that may be split.
-        most: uint,
+        max_splits: uint,
         /// Places in the table of split nodes: a power of two.
         places: uint,
         /// Where the levels are: for each the offset of its squares, how many there are (x, z), the offset of its split
@@ -271,7 +271,7 @@ shared! {
         /// In the scratch: ids of split nodes, by place.
         keys: uint,
         /// In the scratch: ratios, as bits.
-        ratios: uint,
+        error_margins: uint,
         /// In the scratch: which children are blocks.
         blocks: uint,
         /// In the scratch: instances of each seed.
@@ -297,7 +297,7 @@ shared! {
     }
 
     /// What the oracle is given beside the scene.
-    struct OracleInput {
+    struct ErrorPassInput {
         /// Half the picture, pixels.
         half_size: vec2,
         /// Triangles.

@@ -1,8 +1,8 @@
 //! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
 
 pub mod distance;
-pub mod driver;
 pub mod expand;
+pub mod gpu_selection;
 pub mod layout;
 pub mod normals;
 pub mod place;
@@ -11,7 +11,7 @@ pub mod weights;
 
 use std::ops::Range;
 
-pub use driver::Driver;
+pub use gpu_selection::GpuSelection;
 pub use layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 pub use normals::Normals;
 
@@ -102,17 +102,17 @@ pub enum Seams {
 
 /// What keeps land behind other land out of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hiding {
+pub enum DepthMode {
     /// A depth buffer: draws come in any order.
     #[default]
-    ByDepth,
+    Buffer,
     /// The order of the triangles: the furthest one comes first, and the last one drawn shows (painter's algorithm).
-    ByOrder,
+    Painter,
 }
 
 /// The kinds of draws that a technique's lists hold: what the executor has programs for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Draws {
+pub struct DrawKinds {
     /// Some are of [`Source::Lattice`].
     pub lattice: bool,
     /// Some are of [`Source::Resident`] or [`Source::Streamed`]: one program draws both.
@@ -125,9 +125,9 @@ pub struct Draws {
 
 /// What a technique's lists ask of the programs that draw them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Manner {
+pub struct PipelineRequirements {
     /// What the lists hold.
-    pub draws: Draws,
+    pub draws: DrawKinds,
     /// How lattice vertices move.
     pub morph: Morph,
     /// How meshes meet: which of the two proofs lists pass ([`watertight`](crate::measure::watertight)).
@@ -135,7 +135,7 @@ pub struct Manner {
     /// Where normals come from.
     pub normals: Normals,
     /// What hides land behind other land.
-    pub hiding: Hiding,
+    pub depth_mode: DepthMode,
 }
 
 /// How draws reach the device; the triangles are the same.
@@ -146,9 +146,9 @@ pub enum Submission {
     Indirect,
     /// One recorded draw call per draw.
     Direct,
-    /// The device finds draws and instances itself ([`Driver`]) from [`DrawList::parameters`]; those in the list, if
+    /// The device finds draws and instances itself ([`GpuSelection`]) from [`DrawList::parameters`]; those in the list, if
     /// any, were read back.
-    Driven,
+    GpuDriven,
 }
 
 /// What a technique wants drawn in one view.
@@ -177,9 +177,9 @@ pub struct DrawList {
     pub reach_m: f64,
     /// What the view's tolerance was multiplied by because the list would not have fitted its limits: 1 where
     /// nothing was, infinite where no tolerance was kept.
-    pub widening: f64,
+    pub tolerance_scale: f64,
     /// Instances in sight that are coarser than the tolerance allows because something finer is not there yet.
-    pub waiting: usize,
+    pub pending: usize,
 }
 
 /// The most that any list of a technique holds: buffers of this size are made once.
@@ -201,22 +201,22 @@ pub struct Limits {
 
 /// What a technique keeps on the device, and the room that its lists need there.
 #[derive(Clone, Copy, Debug)]
-pub struct Kept<'a> {
+pub struct DeviceGeometry<'a> {
     /// Geometry.
     pub geometry: &'a Geometry,
     /// The most of any list.
     pub limits: Limits,
     /// How the device finds draws itself, if it can.
-    pub driver: Option<&'a Driver>,
+    pub gpu_selection: Option<&'a GpuSelection>,
 }
 
-impl Default for Draws {
+impl Default for DrawKinds {
     fn default() -> Self {
         Self { lattice: true, explicit: false, triangles: true, strips: false }
     }
 }
 
-impl Draws {
+impl DrawKinds {
     /// Triangles of explicit vertices, and no other draws.
     pub const EXPLICIT: Self = Self::explicit(Topology::Triangles);
 
@@ -283,8 +283,8 @@ impl Default for DrawList {
             submission: Submission::default(),
             parameters: Vec::new(),
             reach_m: f64::INFINITY,
-            widening: 1.0,
-            waiting: 0,
+            tolerance_scale: 1.0,
+            pending: 0,
         }
     }
 }
@@ -304,8 +304,8 @@ impl DrawList {
         self.submission = Submission::default();
         self.parameters.clear();
         self.reach_m = f64::INFINITY;
-        self.widening = 1.0;
-        self.waiting = 0;
+        self.tolerance_scale = 1.0;
+        self.pending = 0;
     }
 
     /// The height above zero of an explicit vertex's own height, metres, rounded.
@@ -330,7 +330,7 @@ impl DrawList {
     pub fn commands(&self) -> usize {
         match self.submission {
             Submission::Direct => self.draws.len(),
-            Submission::Driven => 1,
+            Submission::GpuDriven => 1,
             Submission::Indirect => {
                 self.draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)).count()
             }

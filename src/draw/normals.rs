@@ -31,8 +31,8 @@ pub fn unpack(packed: u32) -> Vec3 {
 
 /// The unit normal of a vertex, gone over as far as its height has.
 pub fn explicit_normal(instance: &Instance, vertex: &ExplicitVertex, normals: &VertexNormals) -> Vec3 {
-    let [weight, further] = explicit_weights(instance, vertex);
-    let target = unpack(normals.target).lerp(unpack(normals.further), further);
+    let [weight, second_target] = explicit_weights(instance, vertex);
+    let target = unpack(normals.target).lerp(unpack(normals.second_target), second_target);
     // None points down: their mean is not zero, unless two are level and opposite.
     unpack(normals.normal).lerp(target, weight).try_normalize().unwrap_or(Vec3::Y)
 }

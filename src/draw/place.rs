@@ -10,7 +10,7 @@ use crate::view::View;
 
 /// What positions are told from, so that nothing large is rounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Anchor {
+pub struct RenderOrigin {
     /// The lattice position nearest the eye.
     pub at: [i32; 2],
     /// Where that lies relative to the eye (x, z), metres.
@@ -21,7 +21,7 @@ pub struct Anchor {
     pub height_relative: f32,
 }
 
-impl Anchor {
+impl RenderOrigin {
     /// The anchor of an eye over a lattice.
     pub fn new(origin: [f64; 2], spacing: [f64; 2], eye: glam::DVec3) -> Self {
         // It may lie far outside the field: i32 is clamped so that differences stay exact.
@@ -38,21 +38,21 @@ impl Anchor {
 impl Frame {
     /// The part of a frame that says where vertices lie.
     pub fn placing(field: &Field, view: &View) -> Frame {
-        let anchor = Anchor::new(field.origin, field.spacing, view.eye);
+        let render_origin = RenderOrigin::new(field.origin, field.spacing, view.eye);
         let (height_zero, height_scale) = match *field.samples() {
             Samples::F32(_) => (0.0, 1.0),
             Samples::Coded { zero, scale, .. } => (zero, scale),
         };
         Frame {
             clip_from_relative: view.clip_from_relative().as_mat4().to_cols_array_2d(),
-            anchor: anchor.at,
-            anchor_relative: anchor.relative,
-            anchor_height: anchor.height,
-            anchor_height_relative: anchor.height_relative,
+            render_origin: render_origin.at,
+            render_origin_relative: render_origin.relative,
+            render_origin_height: render_origin.height,
+            render_origin_height_relative: render_origin.height_relative,
             spacing: field.spacing.map(|s| s as f32),
             last: field.size().map(|n| n as i32 - 1),
             stored: field.stored().map(|n| n as i32),
-            anchor_stored: [0, 1].map(|k| repeated(field, anchor.at[k], k)),
+            render_origin_stored: [0, 1].map(|k| repeated(field, render_origin.at[k], k)),
             height_zero,
             height_scale,
             ..Frame::default()
@@ -96,13 +96,20 @@ pub fn placed(field: &Field, frame: &Frame, instance: &Instance, position: [i32;
 
 /// A turned vertex of a mesh with skirts. Its quadrant goes over to the next coarser level by itself.
 fn hung_vertex(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 2]) -> Placed {
-    let hung = skirts::hung(instance, turned);
-    let level = skirts::quadrant_level(instance, hung.quadrant);
-    let height = quadrant_height(field, frame, instance, hung.at, level, get(instance, inside(hung.quadrant)) & !FINER);
-    let skirt = if hung.side.is_some() { SKIRT } else { 0 };
+    let skirt_vertex = skirts::skirt_vertex(instance, turned);
+    let level = skirts::quadrant_level(instance, skirt_vertex.quadrant);
+    let height = quadrant_height(
+        field,
+        frame,
+        instance,
+        skirt_vertex.at,
+        level,
+        get(instance, inside(skirt_vertex.quadrant)) & !FINER,
+    );
+    let skirt = if skirt_vertex.side.is_some() { SKIRT } else { 0 };
     Placed {
-        at: lattice_position(frame, instance, hung.at),
-        height: height - skirts::depth(instance, &hung),
+        at: lattice_position(frame, instance, skirt_vertex.at),
+        height: height - skirts::depth(instance, &skirt_vertex),
         level: level as u32 | skirt,
     }
 }
@@ -139,7 +146,7 @@ fn distant_vertex(field: &Field, frame: &Frame, instance: &Instance, turned: [i3
 /// A mesh vertex turned as its instance says, in mesh units.
 pub fn turned_position(instance: &Instance, [x, z]: [i32; 2]) -> [i32; 2] {
     let cells = instance.cells as i32;
-    match instance.turns {
+    match instance.rotation {
         0 => [x, z],
         1 => [cells - z, x],
         2 => [cells - x, cells - z],
@@ -221,9 +228,9 @@ fn edge_height(field: &Field, frame: &Frame, instance: &Instance, turned: [i32; 
     let upright = slot.1 < 2;
     let along = if upright { turned[1] } else { turned[0] };
     let step = step_at(instance, turned);
-    let further = i32::from(along & step == 0);
-    let weight = (get(instance, slot) as i32 - further * ONE as i32).clamp(0, ONE as i32);
-    let reach = step << further;
+    let second_target = i32::from(along & step == 0);
+    let weight = (get(instance, slot) as i32 - second_target * ONE as i32).clamp(0, ONE as i32);
+    let reach = step << second_target;
     let sampled = sampled_height(field, frame, instance, turned);
     if weight == 0 || along & reach == 0 {
         return sampled;
@@ -262,8 +269,8 @@ pub fn explicit_weights(instance: &Instance, vertex: &ExplicitVertex) -> [f32; 2
 
 /// Height of a vertex that carries its own.
 pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
-    let [weight, further] = explicit_weights(instance, vertex);
-    morphed_height(vertex.height, morphed_height(vertex.target, vertex.further, further), weight)
+    let [weight, second_target] = explicit_weights(instance, vertex);
+    morphed_height(vertex.height, morphed_height(vertex.target, vertex.second_target, second_target), weight)
 }
 
 /// Where an instance draws a vertex that carries its own height: its position in samples, or as the frame says in parts
@@ -279,26 +286,26 @@ pub fn explicit_position(frame: &Frame, instance: &Instance, vertex: &ExplicitVe
 /// Position relative to the eye in metres, world axes, of a corner: its position, as [`explicit_position`] tells it, and
 /// its height.
 pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
-    let [x, z] = relative_to_eye(frame, from_anchor(frame, at));
-    [x, (height - (frame.anchor_height - frame.height_base)) + frame.anchor_height_relative, z]
+    let [x, z] = relative_to_eye(frame, from_render_origin(frame, at));
+    [x, (height - (frame.render_origin_height - frame.height_base)) + frame.render_origin_height_relative, z]
 }
 
 /// From the anchor to a corner's position, samples: whole ones are exact however far away the anchor is from the field.
-pub fn from_anchor(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
+pub fn from_render_origin(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
     let unit = 1 << frame.fraction_bits;
     [0, 1].map(|k| {
-        let whole = (at[k] >> frame.fraction_bits) - frame.anchor[k];
+        let whole = (at[k] >> frame.fraction_bits) - frame.render_origin[k];
         whole as f32 + (at[k] & (unit - 1)) as f32 * (1.0 / unit as f32)
     })
 }
 
 /// From the eye to a lattice position in plan (x, z), metres.
 pub fn relative_plan(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
-    relative_to_eye(frame, [0, 1].map(|k| (at[k] - frame.anchor[k]) as f32))
+    relative_to_eye(frame, [0, 1].map(|k| (at[k] - frame.render_origin[k]) as f32))
 }
 
-fn relative_to_eye(frame: &Frame, from_anchor: [f32; 2]) -> [f32; 2] {
-    [0, 1].map(|k| from_anchor[k] * frame.spacing[k] + frame.anchor_relative[k])
+fn relative_to_eye(frame: &Frame, from_render_origin: [f32; 2]) -> [f32; 2] {
+    [0, 1].map(|k| from_render_origin[k] * frame.spacing[k] + frame.render_origin_relative[k])
 }
 
 /// Height between two shapes: `weight` 0 is the finer one, 1 the coarser one, both to the bit.

@@ -17,7 +17,7 @@ pub const SKIRT: u32 = 1 << 31;
 
 /// A vertex of a mesh with skirts, after the turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Hung {
+pub struct SkirtVertex {
     /// Mesh units as in other meshes, where quadrants meet on a line: of a skirt's vertex, what it hangs from.
     pub at: [i32; 2],
     /// The quadrant, `(x half) + 2 (z half)`.
@@ -42,7 +42,7 @@ pub fn is_skirted(instance: &Instance) -> bool {
 }
 
 /// What a turned vertex is.
-pub fn hung(instance: &Instance, turned: [i32; 2]) -> Hung {
+pub fn skirt_vertex(instance: &Instance, turned: [i32; 2]) -> SkirtVertex {
     let lines = (instance.cells as i32 + 1) / 2;
     let half = turned.map(|n| n / lines);
     let place = [0, 1].map(|k| turned[k] % lines - 1);
@@ -53,7 +53,7 @@ pub fn hung(instance: &Instance, turned: [i32; 2]) -> Hung {
         n if n > last => Some(k + 2),
         _ => None,
     });
-    Hung { at, quadrant: (half[0] + 2 * half[1]) as usize, side }
+    SkirtVertex { at, quadrant: (half[0] + 2 * half[1]) as usize, side }
 }
 
 /// Level of detail of a quadrant.
@@ -62,9 +62,11 @@ pub fn quadrant_level(instance: &Instance, quadrant: usize) -> i32 {
 }
 
 /// How far a vertex hangs down, metres: 0 where its side has no skirt.
-pub fn depth(instance: &Instance, hung: &Hung) -> f32 {
-    match hung.side {
-        Some(side) if instance.weights[1] >> (4 * hung.quadrant + side) & 1 == 1 => f32::from_bits(instance.weights[2]),
+pub fn depth(instance: &Instance, skirt_vertex: &SkirtVertex) -> f32 {
+    match skirt_vertex.side {
+        Some(side) if instance.weights[1] >> (4 * skirt_vertex.quadrant + side) & 1 == 1 => {
+            f32::from_bits(instance.weights[2])
+        }
         _ => 0.0,
     }
 }
@@ -83,10 +85,10 @@ mod tests {
     fn every_line_is_a_place_of_one_quadrant() {
         let instance = Instance { cells: cells(8), ..Instance::default() };
         for (half, place) in (0..2).flat_map(|half| (-1..=9).map(move |place| (half, place))) {
-            let found = hung(&instance, [line(8, half, place), line(8, 1, 3)]);
+            let found = skirt_vertex(&instance, [line(8, half, place), line(8, 1, 3)]);
             let side = [(-1, 0), (9, 2)].into_iter().find(|&(beyond, _)| beyond == place).map(|(_, side)| side);
             let at = [8 * half + place.clamp(0, 8), 11];
-            assert_eq!(found, Hung { at, quadrant: half as usize + 2, side }, "{half} {place}");
+            assert_eq!(found, SkirtVertex { at, quadrant: half as usize + 2, side }, "{half} {place}");
         }
         assert_eq!(line(8, 1, 9), instance.cells as i32, "the last line");
     }
@@ -95,7 +97,7 @@ mod tests {
     fn skirts_hang_where_they_are_set() {
         let mut instance = Instance { cells: cells(8), ..Instance::default() };
         set(&mut instance.weights, 1 << (4 * 2 + 1), 7.5);
-        let hangs = |x, z| depth(&instance, &hung(&instance, [x, z]));
+        let hangs = |x, z| depth(&instance, &skirt_vertex(&instance, [x, z]));
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, -1)), 7.5);
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, 0)), 0.0, "the side itself");
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, 9)), 0.0, "the other side");

@@ -159,13 +159,13 @@ impl Capture {
 
 /// A part in pieces of instances that fit the buffer, if one instance does.
 fn split(part: Part) -> Vec<Part> {
-    let most = (RECORDS / part.place.vertices as usize).max(1);
+    let max = (RECORDS / part.place.vertices as usize).max(1);
     let last = part.draw.instances.end;
     let piece = |first: u32| Part {
-        draw: Draw { instances: first..last.min(first + most as u32), ..part.draw.clone() },
+        draw: Draw { instances: first..last.min(first + max as u32), ..part.draw.clone() },
         place: CapturedPart { first_instance: first, ..part.place },
     };
-    part.draw.instances.clone().step_by(most).map(piece).collect()
+    part.draw.instances.clone().step_by(max).map(piece).collect()
 }
 
 impl Drop for Capture {

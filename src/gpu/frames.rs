@@ -149,7 +149,7 @@ impl Frames {
         let state = &mut self.slots[slot];
         // SAFETY: the fence belongs to the slot.
         let wait = || unsafe { self.gpu.raw.wait_for_fences(&[state.fence], true, u64::MAX) };
-        self.gpu.told(wait).context("waiting for a frame")?;
+        self.gpu.check_device_lost(wait).context("waiting for a frame")?;
         if self.measured && !state.scopes.is_empty() {
             self.timing = state.timing(&self.gpu)?;
             state.scopes.clear();
@@ -318,7 +318,7 @@ fn submit(gpu: &Gpu, commands: vk::CommandBuffer, info: vk::SubmitInfo2, fence: 
     // SAFETY: the command buffer was begun in its slot and nothing else uses the queue.
     unsafe {
         gpu.raw.end_command_buffer(commands)?;
-        gpu.told(|| gpu.raw.queue_submit2(gpu.queue, &info, fence)).context("submitting a frame")
+        gpu.check_device_lost(|| gpu.raw.queue_submit2(gpu.queue, &info, fence)).context("submitting a frame")
     }
 }
 

@@ -40,7 +40,7 @@ impl Gpu {
     }
 
     /// Makes a call that is told when the device is lost; on a lost one none is made.
-    pub(super) fn told<T>(&self, call: impl FnOnce() -> VkResult<T>) -> Result<T> {
+    pub(super) fn check_device_lost<T>(&self, call: impl FnOnce() -> VkResult<T>) -> Result<T> {
         let left = &self.presence.calls_left;
         let is_spent = left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_err();
         let answer = if is_spent || self.is_lost() { Err(vk::Result::ERROR_DEVICE_LOST) } else { call() };

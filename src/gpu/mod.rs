@@ -8,9 +8,11 @@ mod bindings;
 pub mod capture;
 pub mod clock;
 pub mod device;
-pub mod driven;
-pub mod floor;
+pub mod error_pass;
 pub mod frames;
+pub mod gpu_selection;
+pub mod gpu_tile_cache;
+pub mod height_pages;
 #[cfg(feature = "viewer")]
 pub mod hud;
 pub mod instance;
@@ -18,21 +20,19 @@ mod live;
 mod loss;
 mod materials;
 pub mod memory;
-pub mod oracle;
-pub mod pages;
 pub mod pipelines;
+pub mod position_check;
 pub mod probe;
 pub mod renderdoc;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;
+pub mod shading_only;
 pub mod slot;
 #[cfg(feature = "viewer")]
 pub mod swapchain;
 pub mod target;
 pub mod terrain;
-pub mod texture_slots;
-pub mod twin;
 
 pub use device::{Choice, Gpu};
 pub use instance::Instance;

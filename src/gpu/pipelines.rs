@@ -113,7 +113,7 @@ pub(super) enum Pass {
 
 /// Whether such draws bring normals of their own.
 fn lit_by_vertices(plan: &ScenePlan, source: Source) -> bool {
-    plan.manner.normals == Normals::Vertices && source != Source::Lattice
+    plan.requirements.normals == Normals::Vertices && source != Source::Lattice
 }
 
 /// The vertex and the fragment program that draw such draws.
@@ -321,7 +321,7 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
                 (0, PAIR, offset_of!(ExplicitVertex, position)),
                 (1, FLOAT, offset_of!(ExplicitVertex, height)),
                 (2, FLOAT, offset_of!(ExplicitVertex, target)),
-                (3, FLOAT, offset_of!(ExplicitVertex, further)),
+                (3, FLOAT, offset_of!(ExplicitVertex, second_target)),
                 (4, FLOAT, offset_of!(ExplicitVertex, morph)),
                 (5, UINT, offset_of!(ExplicitVertex, regions)),
             ],
@@ -331,7 +331,7 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
         (8, PAIR, offset_of!(Instance, origin)),
         (9, UINT, offset_of!(Instance, cells)),
         (10, vk::Format::R32_SINT, offset_of!(Instance, shift)),
-        (11, UINT, offset_of!(Instance, turns)),
+        (11, UINT, offset_of!(Instance, rotation)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
         (14, WEIGHTS, offset_of!(Instance, weights)),

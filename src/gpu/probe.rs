@@ -59,13 +59,13 @@ pub struct Measured {
     pub counts: Option<Counts>,
 }
 
-/// A list's draws cut for measuring: one by one up to `most`, the rest of each pipeline together.
-pub fn pieces(draws: &[Draw], most: usize) -> Vec<Range<usize>> {
+/// A list's draws cut for measuring: one by one up to `max`, the rest of each pipeline together.
+pub fn pieces(draws: &[Draw], max: usize) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut first = 0;
     for run in draws.chunk_by(|a, b| (a.source, a.topology) == (b.source, b.topology)) {
         let last = first + run.len();
-        let own = most.clamp(first, last);
+        let own = max.clamp(first, last);
         pieces.extend((first..own).map(|k| k..k + 1));
         if own < last {
             pieces.push(own..last);

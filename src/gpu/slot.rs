@@ -8,10 +8,10 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
+use super::gpu_tile_cache::GpuTileCache;
+use super::height_pages::Sampler;
 use super::memory::{Buffer, Image};
-use super::pages::Sampler;
 use super::terrain::IMAGES;
-use super::texture_slots::TextureSlots;
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
 use crate::draw::{Draw, DrawList, Limits, RESTART};
 
@@ -119,7 +119,7 @@ impl Slot {
         gpu: &Gpu,
         images: &[Image; IMAGES],
         samplers: &[Sampler; IMAGES],
-        maps: &TextureSlots,
+        maps: &GpuTileCache,
         table: &Buffer,
     ) {
         let table = [vk::DescriptorBufferInfo { buffer: table.raw, offset: 0, range: vk::WHOLE_SIZE }];

@@ -221,14 +221,14 @@ impl Swapchain {
     /// Makes the images anew, handing the old ones over.
     fn make(&mut self, capabilities: &vk::SurfaceCapabilitiesKHR, [width, height]: [u32; 2]) -> Result<()> {
         self.gpu.wait_idle()?;
-        let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
+        let max = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let copy = vk::ImageUsageFlags::TRANSFER_SRC;
         let alpha = [vk::CompositeAlphaFlagsKHR::OPAQUE, vk::CompositeAlphaFlagsKHR::INHERIT];
         let alpha = alpha.into_iter().find(|a| capabilities.supported_composite_alpha.contains(*a));
         let old = self.raw;
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(self.surface.raw)
-            .min_image_count((capabilities.min_image_count + 1).min(most))
+            .min_image_count((capabilities.min_image_count + 1).min(max))
             .image_format(self.format.format)
             .image_color_space(self.format.color_space)
             .image_extent(vk::Extent2D { width, height })
@@ -284,7 +284,7 @@ impl Swapchain {
             }
             // A window that no one sees may not give its images back.
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
-            Err(error) => return self.excuse(error, "acquiring an image of the window").map(|()| None),
+            Err(error) => return self.classify(error, "acquiring an image of the window").map(|()| None),
         };
         let Shown { image, view, drawn } = self.images[index as usize];
         let attachment = Attachment { image, view, format: self.format.format, size: self.size };
@@ -328,7 +328,7 @@ impl Swapchain {
                 self.note(suboptimal);
                 Ok(())
             }
-            Err(error) => self.excuse(error, "showing a frame"),
+            Err(error) => self.classify(error, "showing a frame"),
         }
     }
 
@@ -339,7 +339,7 @@ impl Swapchain {
     }
 
     /// Takes what is expected of a window as a status.
-    fn excuse(&mut self, error: vk::Result, doing: &'static str) -> Result<()> {
+    fn classify(&mut self, error: vk::Result, doing: &'static str) -> Result<()> {
         match error {
             vk::Result::ERROR_OUT_OF_DATE_KHR => self.state = State::Stale,
             vk::Result::ERROR_SURFACE_LOST_KHR => self.state = State::Lost,

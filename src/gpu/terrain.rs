@@ -8,17 +8,19 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
-use super::driven::Driven;
 use super::frames::{Recording, SLOTS};
+use super::gpu_selection::GpuSelector;
+use super::gpu_tile_cache::Overlay;
+use super::height_pages::{self, Sampler, Sampling};
 use super::materials;
 use super::memory::{Buffer, Image, filled, memory_barrier};
-use super::pages::{self, Sampler, Sampling};
 use super::pipelines::Pipelines;
 use super::slot::{COMMAND, Part, Slot};
 use super::target::Formats;
-use super::texture_slots::Overlay;
 use crate::draw::layout::{ExplicitVertex, Frame, VertexNormals};
-use crate::draw::{Draw, DrawList, Driver, Geometry, Kept, Limits, Source, Submission, Topology, Upload};
+use crate::draw::{
+    DeviceGeometry, Draw, DrawList, Geometry, GpuSelection, Limits, Source, Submission, Topology, Upload,
+};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
@@ -34,7 +36,7 @@ pub struct Terrain {
     images: [Image; IMAGES],
     /// What is laid over it in parts.
     pub overlay: Overlay,
-    driven: Option<Driven>,
+    gpu_selector: Option<GpuSelector>,
 }
 
 /// Geometry that stays.
@@ -55,16 +57,16 @@ impl Terrain {
         plan: &ScenePlan,
         field: &Arc<Field>,
         overlay: Option<&image::RgbaImage>,
-        kept: Kept,
+        geometry: DeviceGeometry,
         formats: Formats,
     ) -> Result<Self> {
         let pipelines = Pipelines::new(gpu, plan, formats)?;
         let images = [
-            pages::heights(gpu, plan, field)?,
-            pages::holes(gpu, plan, field)?,
-            pages::overlay(gpu, overlay.filter(|_| plan.maps.is_none()))?,
+            height_pages::heights(gpu, plan, field)?,
+            height_pages::holes(gpu, plan, field)?,
+            height_pages::overlay(gpu, overlay.filter(|_| plan.maps.is_none()))?,
             materials::image(gpu, plan)?,
-            pages::ceiling(gpu, plan, field)?,
+            height_pages::ceiling(gpu, plan, field)?,
         ];
         let heights = if !plan.filtered {
             Sampling::Texels
@@ -74,28 +76,28 @@ impl Terrain {
             Sampling::Clamped
         };
         let samplers = [
-            pages::sampler(gpu, heights)?,
-            pages::sampler(gpu, Sampling::Texels)?,
-            pages::sampler(gpu, Sampling::Along(plan.drape.repeats()))?,
-            pages::sampler(gpu, Sampling::Repeated)?,
-            pages::sampler(gpu, heights)?,
+            height_pages::sampler(gpu, heights)?,
+            height_pages::sampler(gpu, Sampling::Texels)?,
+            height_pages::sampler(gpu, Sampling::Along(plan.drape.repeats()))?,
+            height_pages::sampler(gpu, Sampling::Repeated)?,
+            height_pages::sampler(gpu, heights)?,
         ];
-        let resident = Resident::new(gpu, kept.geometry)?;
-        let driven = driven(gpu, kept.driver)?;
+        let resident = Resident::new(gpu, geometry.geometry)?;
+        let gpu_selector = gpu_selector(gpu, geometry.gpu_selection)?;
         let overlay = Overlay::new(gpu, plan, field, overlay)?;
         // Last: whoever fails before has none to destroy.
         let descriptors = descriptor_pool(gpu)?;
         let mut terrain = Self {
             gpu: Arc::clone(gpu),
             pipelines,
-            limits: kept.limits,
+            limits: geometry.limits,
             resident,
             slots: Vec::new(),
             descriptors,
             samplers,
             images,
             overlay,
-            driven,
+            gpu_selector,
         };
         terrain.make_slots()?;
         Ok(terrain)
@@ -138,13 +140,13 @@ impl Terrain {
     }
 
     /// Gives the scene another technique: what comes from the field alone stays.
-    pub fn retarget(&mut self, kept: Kept) -> Result<()> {
+    pub fn retarget(&mut self, geometry: DeviceGeometry) -> Result<()> {
         self.gpu.wait_idle()?;
         self.slots.clear();
-        self.driven = None;
-        self.resident = Resident::new(&self.gpu, kept.geometry)?;
-        self.limits = kept.limits;
-        self.driven = driven(&self.gpu, kept.driver)?;
+        self.gpu_selector = None;
+        self.resident = Resident::new(&self.gpu, geometry.geometry)?;
+        self.limits = geometry.limits;
+        self.gpu_selector = gpu_selector(&self.gpu, geometry.gpu_selection)?;
         self.remake_slots()
     }
 
@@ -157,8 +159,8 @@ impl Terrain {
     }
 
     /// The selection on the device, if the technique has a driver and the device can run it.
-    pub fn driven(&self) -> Option<&Driven> {
-        self.driven.as_ref()
+    pub fn gpu_selector(&self) -> Option<&GpuSelector> {
+        self.gpu_selector.as_ref()
     }
 
     /// Writes a frame's data and records its uploads: before the target begins.
@@ -193,10 +195,10 @@ impl Terrain {
 
     /// Records the selection of a list that the device fills: before the target begins.
     pub fn select(&mut self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        if list.submission != Submission::Driven {
+        if list.submission != Submission::GpuDriven {
             return Ok(());
         }
-        self.driven.as_mut().context("no selection on this device")?.select(recording, &list.parameters)
+        self.gpu_selector.as_mut().context("no selection on this device")?.select(recording, &list.parameters)
     }
 
     fn upload(&mut self, recording: &Recording, uploads: &[Upload]) {
@@ -272,12 +274,12 @@ impl Terrain {
         mut record: impl FnMut(&Recording, Range<usize>),
     ) {
         self.bind_scene(r);
-        if list.submission == Submission::Driven {
+        if list.submission == Submission::GpuDriven {
             self.bind_pipeline(r, Source::Lattice, Topology::Triangles);
             self.bind_geometry(r, Source::Lattice);
-            if let Some(driven) = &self.driven {
+            if let Some(gpu_selector) = &self.gpu_selector {
                 // SAFETY: the buffer lives until the frame has ended.
-                unsafe { self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 1, &[driven.instances(r)], &[0]) };
+                unsafe { self.gpu.raw.cmd_bind_vertex_buffers(r.commands, 1, &[gpu_selector.instances(r)], &[0]) };
             }
             return record(r, 0..list.draws.len());
         }
@@ -323,17 +325,17 @@ impl Terrain {
         let raw = &self.gpu.raw;
         match list.submission {
             Submission::Indirect => {
-                let most = self.gpu.limits.max_draw_indirect_count as usize;
-                for first in draws.clone().step_by(most) {
-                    let (offset, count) = ((first * COMMAND) as u64, most.min(draws.end - first) as u32);
+                let max = self.gpu.limits.max_draw_indirect_count as usize;
+                for first in draws.clone().step_by(max) {
+                    let (offset, count) = ((first * COMMAND) as u64, max.min(draws.end - first) as u32);
                     let commands = self.slots[r.slot].commands.raw;
                     // SAFETY: the slot's buffer holds these commands until the frame has ended.
                     unsafe { raw.cmd_draw_indexed_indirect(r.commands, commands, offset, count, COMMAND as u32) };
                 }
             }
-            Submission::Driven => match &self.driven {
-                Some(driven) if draws == (0..list.draws.len()) => driven.draw(r),
-                Some(driven) => driven.draw_some(r, draws),
+            Submission::GpuDriven => match &self.gpu_selector {
+                Some(gpu_selector) if draws == (0..list.draws.len()) => gpu_selector.draw(r),
+                Some(gpu_selector) => gpu_selector.draw_some(r, draws),
                 None => {}
             },
             Submission::Direct => {
@@ -376,8 +378,8 @@ impl Terrain {
     }
 }
 
-fn driven(gpu: &Arc<Gpu>, driver: Option<&Driver>) -> Result<Option<Driven>> {
-    driver.filter(|_| gpu.counts_draws).map(|driver| Driven::new(gpu, driver)).transpose()
+fn gpu_selector(gpu: &Arc<Gpu>, gpu_selection: Option<&GpuSelection>) -> Result<Option<GpuSelector>> {
+    gpu_selection.filter(|_| gpu.counts_draws).map(|gpu_selection| GpuSelector::new(gpu, gpu_selection)).transpose()
 }
 
 impl Resident {

@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::kept::Kept;
+use super::disk_cache::DiskCache;
 use super::levels::{self, Patch};
 use super::progress::Progress;
 use super::{Field, cuts, surface};
@@ -55,13 +55,13 @@ pub struct Bounds {
     measure: Measure,
     last: [u32; 2],
     period: [Option<u32>; 2],
-    levels: Vec<Level>,
+    levels: Vec<BoundsLevel>,
     /// By level, the error of cells that the end of a tiled field cuts; none where errors are not measured.
     cuts: Vec<f32>,
 }
 
 /// The squares of one level: those of a tiled axis begin at every multiple of the side within the period.
-struct Level {
+struct BoundsLevel {
     side: u32,
     count: [u32; 2],
     squares: Vec<Square>,
@@ -82,7 +82,7 @@ impl Square {
 
     /// Whether there is any land; in [`Bounds`]: whether any triangle of the samples' own surface has data.
     #[inline]
-    pub fn has_land(&self) -> bool {
+    pub fn has_terrain(&self) -> bool {
         self.range[0] <= self.range[1]
     }
 
@@ -104,8 +104,8 @@ impl Bounds {
         bounds.lay_out(size[0].max(size[1]) - 1);
         bounds.cuts.resize(bounds.levels.len(), 0.0);
         let is_large = samples(stored) >= KEPT_FROM;
-        let kept = is_large.then(|| Kept::new(field, &measure.name())).flatten();
-        if kept.as_ref().and_then(Kept::read).is_some_and(|content| bounds.fill(&content)) {
+        let cache = is_large.then(|| DiskCache::new(field, &measure.name())).flatten();
+        if cache.as_ref().and_then(DiskCache::read).is_some_and(|content| bounds.fill(&content)) {
             return bounds;
         }
         // A level takes about as long as another: all its squares look at all samples.
@@ -115,7 +115,7 @@ impl Bounds {
             let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
             bounds.cuts = cuts::errors(field, measure, bounds.levels(), low.abs().max(high.abs()));
         }
-        kept.inspect(|kept| kept.write(&bounds.content()));
+        cache.inspect(|cache| cache.write(&bounds.content()));
         bounds
     }
 
@@ -125,7 +125,7 @@ impl Bounds {
             let side = self.side(self.levels());
             let count = [0, 1].map(|k| self.period[k].unwrap_or(self.last[k]).div_ceil(side));
             let squares = vec![Square::NOTHING; (count[0] * count[1]) as usize];
-            self.levels.push(Level { side, count, squares });
+            self.levels.push(BoundsLevel { side, count, squares });
             if side >= longest {
                 return;
             }
@@ -219,7 +219,7 @@ impl Bounds {
     fn tiled_square(&self, level: u32, at: [u32; 2]) -> Square {
         let side = self.side(level);
         let square = self.covering(level, at.map(|n| n * side), [side; 2]);
-        if !square.has_land() || !self.is_partial(level, at) {
+        if !square.has_terrain() || !self.is_partial(level, at) {
             return square;
         }
         // The end of a tiled field cuts squares that are measured whole.
@@ -241,7 +241,7 @@ impl Bounds {
     }
 
     fn measure_level(&mut self, field: &Field, level: u32, progress: &Progress) {
-        let Level { side, count, .. } = self.levels[level as usize];
+        let BoundsLevel { side, count, .. } = self.levels[level as usize];
         let squares = (0..count[0] * count[1]).into_par_iter().map(|k| {
             let first = [k % count[0], k / count[0]].map(|n| n * side);
             let square = self.measured(field, level, first);
@@ -256,10 +256,10 @@ impl Bounds {
         // No further than once around, or to the end.
         let reach = [0, 1].map(|k| self.period[k].map_or((self.last[k] - first[k]).min(side), |n| n.min(side)));
         let children = match level {
-            0 => Square { error: 0.0, range: range_of_land(field, first, reach) },
+            0 => Square { error: 0.0, range: range_of_terrain(field, first, reach) },
             _ => self.covering(level - 1, first, reach),
         };
-        if !children.has_land() {
+        if !children.has_terrain() {
             return Square::NOTHING;
         }
         let [low, high] = children.range;
@@ -290,7 +290,7 @@ impl Bounds {
     }
 }
 
-impl Level {
+impl BoundsLevel {
     /// Samples that its squares look at.
     fn samples(&self) -> u64 {
         [self.count[0], self.count[1], self.side, self.side].map(u64::from).iter().product()
@@ -319,9 +319,9 @@ pub fn is_aligned(period: u32, level: u32, side: u32) -> bool {
     period.is_multiple_of(side) || side.is_multiple_of(period) && period.is_multiple_of(4 << level)
 }
 
-fn range_of_land(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2] {
+fn range_of_terrain(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2] {
     let last = [0, 1].map(|k| first[k] + reach[k]);
-    if !surface::has_land(field, first.map(|n| n as i32), last.map(|n| n as i32)) {
+    if !surface::has_terrain(field, first.map(|n| n as i32), last.map(|n| n as i32)) {
         return Square::NOTHING.range;
     }
     let heights = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i, j)));
@@ -387,7 +387,7 @@ mod tests {
         assert_eq!(progress.share(), None);
         let bounds = Bounds::new(&rough([75, 52], 3), MEASURE, &progress);
         assert_eq!(progress.share(), Some(1.0));
-        progress.expect(bounds.levels.iter().map(Level::samples).sum());
+        progress.expect(bounds.levels.iter().map(BoundsLevel::samples).sum());
         assert_eq!(progress.share(), Some(0.5));
     }
 

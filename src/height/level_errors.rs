@@ -18,7 +18,7 @@ pub fn largest_errors(bounds: &Bounds) -> Vec<f32> {
 
 /// The largest way, metres, that a vertex goes from the level below into each level: from its sample to the middle of
 /// the edge of the level on which it lies. Vertices whose edge ends beyond the field do not go. 0 of level 0.
-pub fn largest_ways(field: &Field, bounds: &Bounds) -> Vec<f32> {
+pub fn largest_displacements(field: &Field, bounds: &Bounds) -> Vec<f32> {
     let of_level = |level: u32| if level == 0 { 0.0 } else { largest_way(field, bounds, level) };
     (0..bounds.levels()).map(of_level).collect()
 }
@@ -73,15 +73,18 @@ mod tests {
     }
 
     #[test]
-    fn of_a_tiled_field_they_hold_for_the_same_land_without_tiles() {
+    fn of_a_tiled_field_they_hold_for_the_same_terrain_without_tiles() {
         for (size, tiles) in [([64, 32], [3, 5]), ([41, 64], [3, 2]), ([128, 128], [2, 2]), ([30, 43], [3, 3])] {
             let tiled = synth::synth(synth::Kind::Fractal, size, 3).tiled(tiles);
-            let of = |field: &Field| (largest_errors(&bounds(field)), largest_ways(field, &bounds(field)));
-            let ((errors, ways), (exact_errors, exact_ways)) = (of(&tiled), of(&held(&tiled)));
+            let of = |field: &Field| (largest_errors(&bounds(field)), largest_displacements(field, &bounds(field)));
+            let ((errors, displacements), (exact_errors, exact_displacements)) = (of(&tiled), of(&held(&tiled)));
             for level in 1..errors.len() {
                 let what = format!("{size:?} {tiles:?} level {level}");
                 assert!(errors[level] >= exact_errors[level] * (1.0 - 1e-6), "{what}: {errors:?} {exact_errors:?}");
-                assert!(ways[level] >= exact_ways[level] * (1.0 - 1e-6), "{what}: {ways:?} {exact_ways:?}");
+                assert!(
+                    displacements[level] >= exact_displacements[level] * (1.0 - 1e-6),
+                    "{what}: {displacements:?} {exact_displacements:?}"
+                );
             }
         }
     }
@@ -90,9 +93,12 @@ mod tests {
     fn no_vertex_goes_further_than_its_levels_error_where_there_are_no_holes() {
         let field = synth::synth(synth::Kind::Eroded, [129, 97], 5);
         let bounds = bounds(&field);
-        let (errors, ways) = (largest_errors(&bounds), largest_ways(&field, &bounds));
+        let (errors, displacements) = (largest_errors(&bounds), largest_displacements(&field, &bounds));
         for level in 1..errors.len() {
-            assert!(ways[level] > 0.0 && ways[level] <= errors[level] * (1.0 + 1e-5), "{level}: {ways:?} {errors:?}");
+            assert!(
+                displacements[level] > 0.0 && displacements[level] <= errors[level] * (1.0 + 1e-5),
+                "{level}: {displacements:?} {errors:?}"
+            );
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod cave;
 mod crs;
 mod cuts;
 pub mod demo;
+pub(crate) mod disk_cache;
 mod envi;
 mod folder;
 mod geokeys;
@@ -17,7 +18,6 @@ mod georef;
 mod geotiff;
 mod hgt;
 mod holes;
-pub(crate) mod kept;
 mod known_formats;
 pub mod level_errors;
 pub mod levels;
@@ -205,7 +205,7 @@ pub struct Field {
     pub crs: Option<String>,
     /// The file that it was read from, if what takes long to work out of it may be kept beside that.
     pub source: Option<PathBuf>,
-    land: Option<Arc<Bezier>>,
+    terrain: Option<Arc<Bezier>>,
     ceiling: Option<Arc<Field>>,
 }
 
@@ -230,25 +230,25 @@ impl Field {
         assert_eq!(samples.len(), x_count as usize * z_count as usize);
         assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
         let (stored, tiles, origin) = ([x_count, z_count], [1, 1], [0.0, 0.0]);
-        let (crs, source, land, ceiling) = (None, None, None, None);
-        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs, source, land, ceiling };
+        let (crs, source, terrain, ceiling) = (None, None, None, None);
+        let mut field = Self { samples, holes, stored, tiles, spacing, origin, crs, source, terrain, ceiling };
         field.fill_holes();
         field
     }
 
     /// A land that no samples are kept of: heights are worked out when they are asked for, on a lattice of
     /// [`bezier::LATTICE`] places a side. What is held in memory, and so its statistics, are of a raster of it.
-    pub fn endless(land: Arc<Bezier>) -> Self {
+    pub fn endless(terrain: Arc<Bezier>) -> Self {
         const SIDE: u32 = 257;
         let place = |k: u32| f64::from(k) * bezier::SIDE_M / f64::from(SIDE - 1);
-        let heights = (0..SIDE * SIDE).map(|k| land.height([place(k % SIDE), place(k / SIDE)]) as f32);
+        let heights = (0..SIDE * SIDE).map(|k| terrain.height([place(k % SIDE), place(k / SIDE)]) as f32);
         let (samples, holes) = (Samples::F32(heights.collect()), Holes::none((SIDE * SIDE) as usize));
-        Self { land: Some(land), ..Self::new(samples, [SIDE; 2], [bezier::SPACING_M; 2], holes) }
+        Self { terrain: Some(terrain), ..Self::new(samples, [SIDE; 2], [bezier::SPACING_M; 2], holes) }
     }
 
     /// What heights are worked out from, where no samples are kept of them.
-    pub fn land(&self) -> Option<&Arc<Bezier>> {
-        self.land.as_ref()
+    pub fn procedural(&self) -> Option<&Arc<Bezier>> {
+        self.terrain.as_ref()
     }
 
     /// The field repeated `tiles` times along (x, z); sample (0, 0) follows the last one.
@@ -259,7 +259,7 @@ impl Field {
 
     /// Samples along (x, z), tiling included.
     pub fn size(&self) -> [u32; 2] {
-        if self.land.is_some() {
+        if self.terrain.is_some() {
             return [bezier::LATTICE; 2];
         }
         [self.stored[0] * self.tiles[0], self.stored[1] * self.tiles[1]]
@@ -309,8 +309,8 @@ impl Field {
     /// Height of sample `(i, j)`, metres; always finite.
     #[inline]
     pub fn height(&self, i: u32, j: u32) -> f32 {
-        if let Some(land) = &self.land {
-            return land.height([i, j].map(|n| f64::from(n) * bezier::SPACING_M)) as f32;
+        if let Some(terrain) = &self.terrain {
+            return terrain.height([i, j].map(|n| f64::from(n) * bezier::SPACING_M)) as f32;
         }
         self.samples.height(self.index(i, j))
     }

@@ -322,11 +322,11 @@ impl Canvas {
     }
 
     fn warnings(&self, count: usize, metres: f64) -> Vec<String> {
-        let (apart, most) = self.apart;
+        let (apart, max) = self.apart;
         let gaps = count as u64 - self.covered.count();
         let overlap = (apart > 0).then(|| {
-            let most = f64::from(most) * metres.abs();
-            format!("{apart} samples have other heights in another file, up to {most:.2} m apart: the last file counts")
+            let max = f64::from(max) * metres.abs();
+            format!("{apart} samples have other heights in another file, up to {max:.2} m apart: the last file counts")
         });
         let gap = (gaps > 0).then(|| format!("{gaps} of {count} samples lie in no file and are holes"));
         overlap.into_iter().chain(gap).collect()

@@ -55,8 +55,8 @@ pub fn visit_samples_between(triangle: &Triangle, fraction_bits: u32, mut visit:
     let edges = [edge(b, c), edge(c, a), edge(a, b)];
     let heights = triangle.map(|corner| f64::from(corner.y));
     let samples = |n: [i32; 3]| {
-        let (least, most) = (n[0].min(n[1]).min(n[2]), n[0].max(n[1]).max(n[2]));
-        (-i64::from(-least >> fraction_bits), i64::from(most >> fraction_bits))
+        let (min, max) = (n[0].min(n[1]).min(n[2]), n[0].max(n[1]).max(n[2]));
+        (-i64::from(-min >> fraction_bits), i64::from(max >> fraction_bits))
     };
     let ((west, east), (north, south)) = (samples([a.x, b.x, c.x]), samples([a.z, b.z, c.z]));
     for z in north..=south {
@@ -94,14 +94,14 @@ fn span(row: &[[i64; 2]; 3], west: i64, east: i64) -> RangeInclusive<i64> {
 }
 
 /// Whether a triangle of the samples' own surface has data at its three corners.
-pub fn is_land(field: &Field, triangle: &[[i32; 2]; 3]) -> bool {
+pub fn is_terrain(field: &Field, triangle: &[[i32; 2]; 3]) -> bool {
     triangle.iter().all(|&[x, z]| !field.is_hole(x as u32, z as u32))
 }
 
 /// Whether there is a triangle with data between two lattice positions, both inclusive.
-pub fn has_land(field: &Field, first: [i32; 2], last: [i32; 2]) -> bool {
+pub fn has_terrain(field: &Field, first: [i32; 2], last: [i32; 2]) -> bool {
     let mut cells = (first[1]..last[1]).flat_map(|j| (first[0]..last[0]).map(move |i| (i, j)));
-    field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).iter().any(|t| is_land(field, t)))
+    field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).iter().any(|t| is_terrain(field, t)))
 }
 
 /// Height of the samples' own triangles, metres, at a position among the samples; `None` outside or where the triangle
@@ -118,11 +118,11 @@ pub fn height_at(field: &Field, at: [f64; 2]) -> Option<f64> {
         [area(b, c), area(c, a), area(a, b)]
     };
     let triangle = rtin::cell(i, j).into_iter().max_by(|a, b| {
-        let least = |t| weights(t).into_iter().fold(f64::INFINITY, f64::min);
-        least(a).total_cmp(&least(b))
+        let min = |t| weights(t).into_iter().fold(f64::INFINITY, f64::min);
+        min(a).total_cmp(&min(b))
     })?;
     let height = |[x, z]: [i32; 2]| f64::from(field.height(x as u32, z as u32));
-    is_land(field, &triangle).then(|| weights(&triangle).iter().zip(triangle).map(|(w, p)| w * height(p)).sum())
+    is_terrain(field, &triangle).then(|| weights(&triangle).iter().zip(triangle).map(|(w, p)| w * height(p)).sum())
 }
 
 /// The largest vertical distance, metres, of an up-facing triangle from the field's samples inside it,
@@ -194,7 +194,7 @@ mod tests {
                 for [u, v] in [[0.1, 0.1], [0.2, 0.3], [0.3, 0.6], [0.6, 0.1]] {
                     let at = |k: usize| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]);
                     let height = height_at(&field, [at(0), at(1)]);
-                    if is_land(&field, &triangle) {
+                    if is_terrain(&field, &triangle) {
                         assert!((height.unwrap() - at(2)).abs() < 1e-9, "cell ({i}, {j}): {height:?}, not {}", at(2));
                         seen += 1;
                     }

@@ -154,5 +154,5 @@ fn unpack(reader: &mut (impl Read + Seek), layout: &Layout, chunk: &Chunk) -> Re
     if layout.is_bit_reversed {
         packed.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
     }
-    layout.codec.unpack(packed, layout.least_bytes(chunk), layout.most_bytes(chunk))
+    layout.codec.unpack(packed, layout.min_bytes(chunk), layout.max_bytes(chunk))
 }

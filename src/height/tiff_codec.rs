@@ -67,24 +67,24 @@ impl Codec {
         }
     }
 
-    /// The data of a chunk, `least` to `most` bytes. Fewer, more, and bytes after their end are errors.
+    /// The data of a chunk, `min` to `max` bytes. Fewer, more, and bytes after their end are errors.
     ///
     /// Deflate has an Adler-32, which is compared; ZSTD may have an XXH64, which is too. The others have no checksum.
-    pub fn unpack(self, packed: Vec<u8>, least: usize, most: usize) -> Result<Vec<u8>, String> {
+    pub fn unpack(self, packed: Vec<u8>, min: usize, max: usize) -> Result<Vec<u8>, String> {
         let (bytes, rest) = match self {
             Codec::None => {
-                let used = packed.len().min(most);
+                let used = packed.len().min(max);
                 let (rest, mut bytes) = (packed[used..].to_vec(), packed);
                 bytes.truncate(used);
                 (bytes, rest)
             }
-            Codec::Lzw => (lzw(&packed, most)?, Vec::new()),
-            Codec::Deflate => inflate(&packed, most)?,
-            Codec::PackBits => pack_bits(&packed, most)?,
-            Codec::Zstd => (unzstd(&packed, most)?, Vec::new()),
+            Codec::Lzw => (lzw(&packed, max)?, Vec::new()),
+            Codec::Deflate => inflate(&packed, max)?,
+            Codec::PackBits => pack_bits(&packed, max)?,
+            Codec::Zstd => (unzstd(&packed, max)?, Vec::new()),
         };
-        if bytes.len() < least {
-            return Err(format!("expected {least} bytes, found the end of the data after {}", bytes.len()));
+        if bytes.len() < min {
+            return Err(format!("expected {min} bytes, found the end of the data after {}", bytes.len()));
         }
         if rest.len() > PADDING || rest.iter().any(|&byte| byte != 0) {
             return Err(format!("expected the end of the data, found {} more bytes", rest.len()));
@@ -94,31 +94,31 @@ impl Codec {
 }
 
 /// Unpacks a zlib stream; returns what follows it too.
-fn inflate(packed: &[u8], most: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
+fn inflate(packed: &[u8], max: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
     let mut stream = Decompress::new(true);
     // A byte more than expected shows data that go on.
-    let mut bytes = Vec::with_capacity(most + 1);
+    let mut bytes = Vec::with_capacity(max + 1);
     let status = stream.decompress_vec(packed, &mut bytes, FlushDecompress::Finish).map_err(|e| e.to_string())?;
     match status {
         Status::StreamEnd => Ok((bytes, packed[stream.total_in() as usize..].to_vec())),
-        _ if bytes.len() > most => Err(format!("expected at most {most} bytes, found more")),
+        _ if bytes.len() > max => Err(format!("expected at most {max} bytes, found more")),
         _ => Err(format!("expected the end of a zlib stream, found the end of the data after {} bytes", bytes.len())),
     }
 }
 
 /// Unpacks the frames of ZSTD, which must end where the data do.
-fn unzstd(packed: &[u8], most: usize) -> Result<Vec<u8>, String> {
-    zstd::bulk::decompress(packed, most).map_err(|e| format!("expected whole ZSTD frames of at most {most} bytes: {e}"))
+fn unzstd(packed: &[u8], max: usize) -> Result<Vec<u8>, String> {
+    zstd::bulk::decompress(packed, max).map_err(|e| format!("expected whole ZSTD frames of at most {max} bytes: {e}"))
 }
 
 /// Unpacks LZW. Writers may leave out the end code, or write it a bit too short where the code width changes: data that
 /// fill the chunk are complete without it.
-fn lzw(packed: &[u8], most: usize) -> Result<Vec<u8>, String> {
+fn lzw(packed: &[u8], max: usize) -> Result<Vec<u8>, String> {
     // The last codes and the end code: at most 12 bits each, and the rest of a byte.
     const END_BYTES: usize = 4;
     let mut decoder = Configuration::with_tiff_size_switch(BitOrder::Msb, 8).with_yield_on_full_buffer(true).build();
-    let (mut bytes, mut used, mut filled) = (vec![0; most], 0, 0);
-    while filled < most {
+    let (mut bytes, mut used, mut filled) = (vec![0; max], 0, 0);
+    while filled < max {
         let step = decoder.decode_bytes(&packed[used..], &mut bytes[filled..]);
         (used, filled) = (used + step.consumed_in, filled + step.consumed_out);
         match step.status {
@@ -135,9 +135,9 @@ fn lzw(packed: &[u8], most: usize) -> Result<Vec<u8>, String> {
 }
 
 /// Unpacks runs and literals; returns what follows them too.
-fn pack_bits(packed: &[u8], most: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
-    let (mut bytes, mut rest) = (Vec::with_capacity(most), packed);
-    while bytes.len() < most
+fn pack_bits(packed: &[u8], max: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
+    let (mut bytes, mut rest) = (Vec::with_capacity(max), packed);
+    while bytes.len() < max
         && let Some((&head, tail)) = rest.split_first()
     {
         let (run, literal) = (head & 0x80 != 0, usize::from(head) + 1);
@@ -155,8 +155,8 @@ fn pack_bits(packed: &[u8], most: usize) -> Result<(Vec<u8>, Vec<u8>), String> {
             _ => return Err("expected a run or literal bytes, found the end of the data".to_owned()),
         };
     }
-    if bytes.len() > most {
-        return Err(format!("expected at most {most} bytes, found {}", bytes.len()));
+    if bytes.len() > max {
+        return Err(format!("expected at most {max} bytes, found {}", bytes.len()));
     }
     Ok((bytes, rest.to_vec()))
 }

@@ -100,11 +100,11 @@ impl Layout {
             (tags.numbers(Tag::StripOffsets)?, tags.numbers(Tag::StripByteCounts)?)
         };
         let [cw, ch] = self.chunk_size;
-        let most = options.max_samples.saturating_mul(8).max(CHUNK_BYTES);
+        let max = options.max_samples.saturating_mul(8).max(CHUNK_BYTES);
         let chunk_bytes = (cw as u64).checked_mul(self.packing.pixel_bits() as u64).map(|bits| bits.div_ceil(8));
         let chunk_bytes = chunk_bytes.and_then(|row| row.checked_mul(ch as u64));
-        if cw == 0 || ch == 0 || chunk_bytes.is_none_or(|bytes| bytes > most) {
-            let what = format!("expected at most {most} bytes a {}, found {cw}x{ch} pixels", self.chunk_name);
+        if cw == 0 || ch == 0 || chunk_bytes.is_none_or(|bytes| bytes > max) {
+            let what = format!("expected at most {max} bytes a {}, found {cw}x{ch} pixels", self.chunk_name);
             return Err(tags.error("TileWidth, TileLength, RowsPerStrip", what));
         }
         let [across, down] = [w.div_ceil(cw), h.div_ceil(ch)];
@@ -133,7 +133,7 @@ impl Layout {
         if at.checked_add(count).is_none_or(|end| end > len) {
             return Err(format!("expected {count} bytes at byte {at}, found the file's end at {len}"));
         }
-        if count.saturating_mul(self.codec.expansion()) < self.least_bytes(chunk) as u64 {
+        if count.saturating_mul(self.codec.expansion()) < self.min_bytes(chunk) as u64 {
             let [w, h] = chunk.size;
             return Err(format!("expected enough data for {w}x{h} samples, found {count} bytes"));
         }
@@ -146,17 +146,17 @@ impl Layout {
     }
 
     /// Bytes that a chunk must hold: a tile has all its rows, a strip those of the image.
-    pub fn least_bytes(&self, chunk: &Chunk) -> usize {
+    pub fn min_bytes(&self, chunk: &Chunk) -> usize {
         let rows = if self.chunk_name == "tile" { self.chunk_size[1] } else { chunk.size[1] };
         self.row_bytes() * rows
     }
 
     /// Bytes that a chunk may hold: some writers pad the last strip.
-    pub fn most_bytes(&self, chunk: &Chunk) -> usize {
-        let [least, full] = [self.least_bytes(chunk), self.row_bytes() * self.chunk_size[1]];
+    pub fn max_bytes(&self, chunk: &Chunk) -> usize {
+        let [min, full] = [self.min_bytes(chunk), self.row_bytes() * self.chunk_size[1]];
         // No more than its bytes can become.
         let possible = usize::try_from(chunk.bytes[1].saturating_mul(self.codec.expansion())).unwrap_or(usize::MAX);
-        full.min(possible).max(least)
+        full.min(possible).max(min)
     }
 
     /// A chunk's name in messages.

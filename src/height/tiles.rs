@@ -16,13 +16,13 @@ use super::{
 };
 
 /// Files of one zoom level by column from the west and row from the north.
-type Level = BTreeMap<[u32; 2], PathBuf>;
+type ZoomLevel = BTreeMap<[u32; 2], PathBuf>;
 
 /// A directory of tiles.
 pub(super) struct Tiles {
     grid: TileGrid,
     /// By zoom level and by whether the tiles have twice the pixels, `@2x`.
-    levels: BTreeMap<(u32, bool), Level>,
+    levels: BTreeMap<(u32, bool), ZoomLevel>,
 }
 
 /// The deepest zoom level: 2^30 tiles a side, so that sample positions fit.
@@ -93,7 +93,7 @@ fn no_tiles(name: &str) -> Error {
 
 /// All tiles of a directory, none where it is another kind of folder.
 pub(super) fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
-    let mut levels: BTreeMap<(u32, bool), Level> = BTreeMap::new();
+    let mut levels: BTreeMap<(u32, bool), ZoomLevel> = BTreeMap::new();
     let grid = TileGrid::read(path)?;
     for (zoom, _, zoom_path) in numbered(path)?.into_iter().filter(|(zoom, _, path)| *zoom <= MAX_ZOOM && path.is_dir())
     {
@@ -133,15 +133,15 @@ fn is_picture(path: &Path) -> bool {
 
 /// The zoom level asked for, else the highest whose tiles fill their rectangle, else the highest; of both densities the
 /// one with more tiles, else the finer.
-fn choose(levels: BTreeMap<(u32, bool), Level>, name: &str, options: &Options) -> Result<(u32, Level), Error> {
-    let mut fullest: BTreeMap<u32, Level> = BTreeMap::new();
+fn choose(levels: BTreeMap<(u32, bool), ZoomLevel>, name: &str, options: &Options) -> Result<(u32, ZoomLevel), Error> {
+    let mut fullest: BTreeMap<u32, ZoomLevel> = BTreeMap::new();
     for ((zoom, _), level) in levels {
         let other = fullest.entry(zoom).or_default();
         if level.len() >= other.len() {
             *other = level;
         }
     }
-    let complete = |level: &Level| {
+    let complete = |level: &ZoomLevel| {
         let [west, north, east, south] = bounds(level);
         u64::from(east - west + 1) * u64::from(south - north + 1) == level.len() as u64
     };
@@ -155,7 +155,7 @@ fn choose(levels: BTreeMap<(u32, bool), Level>, name: &str, options: &Options) -
 }
 
 /// First and last x and y: west, north, east, south.
-fn bounds(level: &Level) -> [u32; 4] {
+fn bounds(level: &ZoomLevel) -> [u32; 4] {
     level.keys().fold([u32::MAX, u32::MAX, 0, 0], |[w, n, e, s], &[x, y]| [w.min(x), n.min(y), e.max(x), s.max(y)])
 }
 

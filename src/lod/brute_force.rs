@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::{Entry, Settings, Technique};
 use crate::draw::{Draw, DrawList, Geometry, Instance, LatticeVertex, Limits, Source, Topology};
-use crate::height::surface::has_land;
+use crate::height::surface::has_terrain;
 use crate::height::{Field, MAX_SIDE, rtin};
 use crate::view::View;
 
@@ -19,7 +19,7 @@ pub const ENTRY: Entry = Entry {
     variants: &[],
     settings: &[],
     needs: &[],
-    most_samples: 1 << 32,
+    max_samples: 1 << 32,
     max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),
@@ -39,7 +39,9 @@ impl BruteForce {
         let blocks = [w, h].map(|n| (n - 1).div_ceil(CELLS as u32) as i32);
         let instances = (0..blocks[1])
             .flat_map(|j| (0..blocks[0]).map(move |i| [i * CELLS, j * CELLS]))
-            .filter(|&[x, z]| has_land(&field, [x, z], [(x + CELLS).min(w as i32 - 1), (z + CELLS).min(h as i32 - 1)]))
+            .filter(|&[x, z]| {
+                has_terrain(&field, [x, z], [(x + CELLS).min(w as i32 - 1), (z + CELLS).min(h as i32 - 1)])
+            })
             .map(|origin| Instance { origin, cells: CELLS as u32, ..Instance::default() })
             .collect();
         Self { mesh: grid(), instances }

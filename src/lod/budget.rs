@@ -59,7 +59,7 @@ const SAME: f64 = 1e-7;
 /// Share of a new frame in the noise that is known.
 const NOISE_SHARE: f64 = 0.05;
 /// Times are never more exact than this, ln cost.
-const LEAST_NOISE: f64 = 0.02;
+const MIN_NOISE: f64 = 0.02;
 /// Deviations that a likely value is within.
 const LIKELY: f64 = 3.0;
 /// Deviations that the slope of a move to a finer level is within.
@@ -74,7 +74,7 @@ const SLOPES: [f64; 2] = [-2e4, -0.25];
 /// The longest moves at once towards finer and coarser levels, ln τ.
 const LONGEST: [f64; 2] = [-6.0, 1.4];
 /// Costs below this are taken for it: their logarithms are finite.
-const LEAST_COST: f64 = 1e-3;
+const MIN_COST: f64 = 1e-3;
 
 /// Moves a tolerance to hold a target.
 #[derive(Clone, Debug)]
@@ -137,7 +137,7 @@ impl Controller {
     /// Takes the cost of a frame, triangles or milliseconds, and the tolerance that it was drawn with, pixels; any
     /// number of frames late, in the order in which they were drawn.
     pub fn learn(&mut self, tolerance_px: f64, cost: f64) {
-        let (at, excess) = (tolerance_px.ln(), (cost.max(LEAST_COST) / self.target.cost()).ln());
+        let (at, excess) = (tolerance_px.ln(), (cost.max(MIN_COST) / self.target.cost()).ln());
         if !at.is_finite() || !excess.is_finite() {
             return;
         }
@@ -158,7 +158,7 @@ impl Controller {
             self.age(if is_same { [error; 2] } else { [-WANDER, WANDER] });
             if is_same && matches!(self.target, Target::FrameMs(_)) {
                 let variance = noise * noise + NOISE_SHARE * (off * off - noise * noise);
-                self.noise = variance.sqrt().clamp(LEAST_NOISE, self.target.noise());
+                self.noise = variance.sqrt().clamp(MIN_NOISE, self.target.noise());
             }
         } else if is_bent {
             model.bend(at, excess, noise);
@@ -224,15 +224,15 @@ impl Controller {
     /// The tolerance nearest to one that is aimed at between those that are too dear and those that are cheap enough.
     fn within(&self, aim: f64) -> f64 {
         let (Some([dear, _]), Some([cheap, _])) = (self.dear, self.cheap) else {
-            let (least, most) = (self.dear.map_or(aim, |dear| dear[0]), self.cheap.map_or(aim, |cheap| cheap[0]));
-            return aim.max(least).min(most);
+            let (min, max) = (self.dear.map_or(aim, |dear| dear[0]), self.cheap.map_or(aim, |cheap| cheap[0]));
+            return aim.max(min).min(max);
         };
         if cheap - dear <= self.target.finest() {
             return cheap;
         }
         // Where lines do not help, halves do.
-        let [least, most] = if self.is_slow { [0.5, 0.5] } else { [0.02, 0.98] };
-        aim.clamp(dear + least * (cheap - dear), dear + most * (cheap - dear))
+        let [min, max] = if self.is_slow { [0.5, 0.5] } else { [0.02, 0.98] };
+        aim.clamp(dear + min * (cheap - dear), dear + max * (cheap - dear))
     }
 }
 

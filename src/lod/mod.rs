@@ -13,7 +13,7 @@ pub mod sphere_tree;
 
 use std::sync::Arc;
 
-use crate::draw::{DrawList, Driver, Geometry, Kept, Limits, Manner, Submission};
+use crate::draw::{DeviceGeometry, DrawList, Geometry, GpuSelection, Limits, PipelineRequirements, Submission};
 use crate::height::Field;
 use crate::view::{Metric, Tolerance, View};
 pub use settings::{Need, Setting, Settings, Values};
@@ -37,7 +37,7 @@ pub trait Technique: Send {
 
     /// How the device finds the draws itself, if it can: the same draws and instances as [`Self::select`], in any
     /// order.
-    fn driver(&self) -> Option<&Driver> {
+    fn gpu_selection(&self) -> Option<&GpuSelection> {
         None
     }
 
@@ -49,15 +49,15 @@ pub trait Technique: Send {
     ///
     /// # Panics
     /// If the technique has no driver.
-    fn drive(&mut self, view: &View, list: &mut DrawList) {
-        assert!(self.driver().is_some(), "a technique with a driver");
-        list.submission = Submission::Driven;
+    fn select_on_gpu(&mut self, view: &View, list: &mut DrawList) {
+        assert!(self.gpu_selection().is_some(), "a technique with a driver");
+        list.submission = Submission::GpuDriven;
         self.parameters(view, &mut list.parameters);
     }
 
     /// What stays on the device.
-    fn kept(&self) -> Kept<'_> {
-        Kept { geometry: self.resident(), limits: self.limits(), driver: self.driver() }
+    fn device_geometry(&self) -> DeviceGeometry<'_> {
+        DeviceGeometry { geometry: self.resident(), limits: self.limits(), gpu_selection: self.gpu_selection() }
     }
 
     /// Whether the lists keep the view's tolerance under its metric.
@@ -70,24 +70,24 @@ pub trait Technique: Send {
     }
 
     /// What its lists ask of the programs that draw them.
-    fn manner(&self) -> Manner {
-        Manner::default()
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        PipelineRequirements::default()
     }
 
     /// What it could have prepared and did not, as this field makes no use of it.
-    fn spared(&self) -> Vec<Spared> {
+    fn omitted(&self) -> Vec<Omitted> {
         Vec::new()
     }
 
     /// What is worth knowing about the data it prepared: name, value, unit.
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         Vec::new()
     }
 }
 
 /// Something that a technique did not prepare.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spared {
+pub struct Omitted {
     /// What it is.
     pub what: &'static str,
     /// Why nothing uses it.
@@ -120,10 +120,10 @@ pub struct Entry {
     /// Which of them do nothing beside some words of others.
     pub needs: &'static [Need],
     /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
-    pub most_samples: u64,
+    pub max_samples: u64,
     /// The most samples along a side of a field, tiling included.
     pub max_side: u32,
-    /// Whether it takes a land without samples ([`Field::land`]).
+    /// Whether it takes a land without samples ([`Field::procedural`]).
     pub takes_endless: bool,
     /// Prepares the technique for a field of at most so many.
     pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
@@ -133,15 +133,15 @@ impl Entry {
     /// The technique prepared for a field, or why not.
     pub fn prepare(&self, field: &Arc<Field>, settings: &Settings) -> Result<Box<dyn Technique>, String> {
         let [w, h] = field.size().map(u64::from);
-        let Self { name, most_samples, .. } = self;
-        if field.land().is_some() && !self.takes_endless {
+        let Self { name, max_samples, .. } = self;
+        if field.procedural().is_some() && !self.takes_endless {
             let able: Vec<_> = TECHNIQUES.iter().filter(|entry| entry.takes_endless).map(|entry| entry.name).collect();
             return Err(format!("{name}: it needs samples, and this land has none: try {}", able.join(", ")));
         }
-        if field.land().is_none() && w * h > self.most_samples {
-            return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {most_samples}"));
+        if field.procedural().is_none() && w * h > self.max_samples {
+            return Err(format!("{name}: {w} x {h} samples, and it goes through them all: at most {max_samples}"));
         }
-        if field.land().is_none() && field.size().iter().any(|&n| n > self.max_side) {
+        if field.procedural().is_none() && field.size().iter().any(|&n| n > self.max_side) {
             return Err(format!("{name}: {w} x {h} samples: expected at most {} a side", self.max_side));
         }
         if field.ceiling().is_some() {
@@ -163,7 +163,7 @@ pub const TECHNIQUES: &[Entry] = &[
 ];
 
 /// What a tolerance is multiplied by until a list fits.
-const WIDENING: f64 = 1.5;
+const SCALE_STEP: f64 = 1.5;
 
 /// Retries `select` with a growing tolerance until its list fits. Returns the result and the scale of the tolerance.
 ///
@@ -173,7 +173,7 @@ const WIDENING: f64 = 1.5;
 ///
 /// # Panics
 /// If `select` makes nothing under an infinite tolerance.
-pub(crate) fn widened<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
+pub(crate) fn select_within_limits<T>(view: &View, mut select: impl FnMut(&View) -> Option<T>) -> (T, f64) {
     if let Some(found) = first_that_fits(view, &mut select) {
         return found;
     }
@@ -190,7 +190,7 @@ fn first_that_fits<T>(view: &View, select: &mut impl FnMut(&View) -> Option<T>) 
     if let Some(selected) = select(view) {
         return Some((selected, 1.0));
     }
-    let factor = |steps: i32| WIDENING.powi(steps);
+    let factor = |steps: i32| SCALE_STEP.powi(steps);
     let px_at = |steps: i32| (view.tolerance.px.max(f64::MIN_POSITIVE) * factor(steps)).min(f64::MAX);
     let mut under = |px: f64| select(&View { tolerance: Tolerance { px, ..view.tolerance }, ..*view });
     let [mut below, mut above] = [0, 1];
@@ -250,9 +250,11 @@ mod tests {
                     asked.push(view.tolerance.px);
                     (view.tolerance.px >= scale * fits_from).then_some(view.tolerance.px)
                 };
-                let (px, widening) = widened(&view(scale), select);
+                let (px, tolerance_scale) = select_within_limits(&view(scale), select);
                 assert_eq!(asked.last(), Some(&px), "what was selected last is the answer");
-                assert!((px / scale / fits_from - 1.0).abs() < 1e-6 && (widening * scale / px - 1.0).abs() < 1e-9);
+                assert!(
+                    (px / scale / fits_from - 1.0).abs() < 1e-6 && (tolerance_scale * scale / px - 1.0).abs() < 1e-9
+                );
                 assert!(
                     asked.len() <= 24 && (steps > 1 || asked.len() as i32 == steps + 1),
                     "{steps}: {}",
@@ -260,8 +262,8 @@ mod tests {
                 );
             }
         }
-        assert!(widened(&view(1e-320), |view| (view.tolerance.px > 1.0).then_some(())).1 > 1e300);
+        assert!(select_within_limits(&view(1e-320), |view| (view.tolerance.px > 1.0).then_some(())).1 > 1e300);
         let keeps_nothing = |view: &View| (view.tolerance.px == f64::INFINITY).then_some(());
-        assert_eq!(widened(&view(1.0), keeps_nothing).1, f64::INFINITY);
+        assert_eq!(select_within_limits(&view(1.0), keeps_nothing).1, f64::INFINITY);
     }
 }

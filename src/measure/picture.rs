@@ -10,7 +10,7 @@ pub fn outline_radius(tolerance_px: f64) -> usize {
 ///
 /// # Panics
 /// If the mask is no whole number of rows.
-pub fn widened(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
+pub fn select_within_limits(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
     let open: Vec<bool> = mask.iter().map(|m| !m).collect();
     inside(&open, width, radius).into_iter().map(|m| !m).collect()
 }
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn only_open_pixels_well_inside_the_land_are_holes() {
+    fn only_open_pixels_well_inside_the_terrain_are_holes() {
         let (truth, width) = picture(&[".......", "#######", "#######", "#######", "#######"]);
         let (covered, _) = picture(&[".......", "..#####", "#######", "####.##", ".######"]);
         assert_eq!(hole_pixels(&covered, &truth, width, 0), [7, 8, 25, 28]);

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn only_land_drawn_in_both_counts() {
+    fn only_terrain_drawn_in_both_counts() {
         // Columns 0 to 9 and 0 to 19: the east side of the smaller one belongs to nobody.
         let found = jump(&slab(10, 3.0), &slab(20, 4.0));
         assert_eq!(found.samples, 10 * 41, "columns 0 to 9");

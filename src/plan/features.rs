@@ -3,7 +3,7 @@
 use super::look::Colour;
 use super::{Decision, ScenePlan};
 use crate::draw::layout::{ExplicitVertex, VertexNormals};
-use crate::draw::{Geometry, Hiding, Kept, Limits, Morph, Normals, Seams};
+use crate::draw::{DepthMode, DeviceGeometry, Geometry, Limits, Morph, Normals, Seams};
 use crate::height::Field;
 use crate::texture::detail;
 
@@ -11,7 +11,7 @@ use crate::texture::detail;
 pub struct Feature {
     /// Its name.
     pub name: &'static str,
-    is_kept: fn(&ScenePlan, &Kept) -> bool,
+    is_kept: fn(&ScenePlan, &DeviceGeometry) -> bool,
     /// Why it is kept.
     kept: &'static str,
     /// Why it is left out.
@@ -19,7 +19,7 @@ pub struct Feature {
     /// Whether it is the technique that needs it, not the scene.
     by_technique: bool,
     /// Device bytes that it takes.
-    bytes: fn(&ScenePlan, &Kept) -> u64,
+    bytes: fn(&ScenePlan, &DeviceGeometry) -> u64,
     /// How it is kept or left out by hand.
     pub(super) force: Force,
 }
@@ -119,20 +119,20 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "vertex weights",
-        is_kept: |plan, _| plan.manner.morph != Morph::No,
+        is_kept: |plan, _| plan.requirements.morph != Morph::No,
         kept: "lattice vertices morph or fall onto coarser sides",
         left_out: "no lattice vertex moves",
         by_technique: true,
         bytes: none,
         force: Force::In(|plan| {
-            if plan.manner.morph == Morph::No {
-                plan.manner.morph = Morph::ByInstance;
+            if plan.requirements.morph == Morph::No {
+                plan.requirements.morph = Morph::ByInstance;
             }
         }),
     },
     Feature {
         name: "skirts",
-        is_kept: |plan, _| plan.manner.seams == Seams::Skirts,
+        is_kept: |plan, _| plan.requirements.seams == Seams::Skirts,
         kept: "meshes have edges of their own",
         left_out: "meshes share their edges",
         by_technique: true,
@@ -141,7 +141,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "vertex normals",
-        is_kept: |plan, _| plan.manner.normals == Normals::Vertices,
+        is_kept: |plan, _| plan.requirements.normals == Normals::Vertices,
         kept: "vertices carry what lights them",
         left_out: "the height texture lights each pixel",
         by_technique: true,
@@ -172,7 +172,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "selection on the device",
-        is_kept: |_, kept| kept.driver.is_some(),
+        is_kept: |_, kept| kept.gpu_selection.is_some(),
         kept: "the technique leaves it to the device",
         left_out: "the host selects",
         by_technique: true,
@@ -186,7 +186,7 @@ pub const FEATURES: &[Feature] = &[
         left_out: "the furthest come first",
         by_technique: true,
         bytes: none,
-        force: Force::In(|plan| plan.manner.hiding = Hiding::ByDepth),
+        force: Force::In(|plan| plan.requirements.depth_mode = DepthMode::Buffer),
     },
     Feature {
         name: "fog",
@@ -272,7 +272,7 @@ pub fn mip_levels(size: [u32; 2]) -> u32 {
     size[0].max(size[1]).ilog2() + 1
 }
 
-fn none(_: &ScenePlan, _: &Kept) -> u64 {
+fn none(_: &ScenePlan, _: &DeviceGeometry) -> u64 {
     0
 }
 
@@ -295,7 +295,7 @@ impl Feature {
         }
     }
 
-    fn decide(&self, plan: &ScenePlan, field: &Field, kept: &Kept) -> (bool, Decision) {
+    fn decide(&self, plan: &ScenePlan, field: &Field, kept: &DeviceGeometry) -> (bool, Decision) {
         let is_kept = (self.is_kept)(plan, kept);
         let reason = match (plan.forced.has(self), is_kept, self.name) {
             (true, true, _) => "kept by hand".to_string(),
@@ -315,8 +315,8 @@ impl ScenePlan {
 
     /// What is kept and what is left out, in that order, for a technique that keeps this on the device; without one
     /// only what the scene decides.
-    pub fn decisions(&self, field: &Field, technique: Option<&Kept>) -> (Vec<Decision>, Vec<Decision>) {
-        let nothing = Kept { geometry: &Geometry::default(), limits: Limits::default(), driver: None };
+    pub fn decisions(&self, field: &Field, technique: Option<&DeviceGeometry>) -> (Vec<Decision>, Vec<Decision>) {
+        let nothing = DeviceGeometry { geometry: &Geometry::default(), limits: Limits::default(), gpu_selection: None };
         let kept = technique.unwrap_or(&nothing);
         let known = FEATURES.iter().filter(|feature| technique.is_some() || !feature.by_technique);
         let all = known.map(|feature| feature.decide(self, field, kept));

@@ -111,8 +111,8 @@ impl Look {
             Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
         };
         let placing = Frame::placing(field, view);
-        let overlay = self.drape_over(field).shares(placing.anchor);
-        let repeats = |k: usize| Repeats::new(placing.anchor[k], field.spacing[k]);
+        let overlay = self.drape_over(field).shares(placing.render_origin);
+        let repeats = |k: usize| Repeats::new(placing.render_origin[k], field.spacing[k]);
         Frame {
             height_range: tinted_range(field, range),
             lamp_reach: lamp_reach(field, view.eye, range),
@@ -155,9 +155,9 @@ struct Repeats {
 }
 
 impl Repeats {
-    fn new(anchor: i32, spacing_m: f64) -> Self {
+    fn new(render_origin: i32, spacing_m: f64) -> Self {
         let shift = (PERIOD_M / spacing_m).log2().round().clamp(-24.0, 24.0) as i32;
-        let first = if shift > 0 { anchor.rem_euclid(1 << shift) } else { 0 };
+        let first = if shift > 0 { render_origin.rem_euclid(1 << shift) } else { 0 };
         Self { first: first as f32, scale: 2f32.powi(-shift) }
     }
 }
@@ -166,8 +166,8 @@ impl Repeats {
 /// that are reconstructed in single precision.
 fn tinted_range(field: &Field, [low, high]: [f32; 2]) -> [f32; 2] {
     let length_m = (0..2).map(|k| f64::from(field.size()[k]) * field.spacing[k]).fold(0.0, f64::max);
-    let least_m = 1e-5 * length_m.min(1e9).max(f64::from(low.abs().max(high.abs())));
-    [low, high.max((f64::from(low) + least_m.max(1e-12)) as f32).max(low.next_up())]
+    let min_m = 1e-5 * length_m.min(1e9).max(f64::from(low.abs().max(high.abs())));
+    [low, high.max((f64::from(low) + min_m.max(1e-12)) as f32).max(low.next_up())]
 }
 
 #[cfg(test)]
@@ -175,17 +175,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn materials_repeat_alike_from_every_anchor() {
+    fn materials_repeat_alike_from_every_render_origin() {
         for spacing in [0.001, 0.3, 1.0, 20.0, 30.7, 512.0, 9000.0, 1e5] {
             let scale = Repeats::new(0, spacing).scale;
             // A place some samples from one anchor is the same place as that many more from another one.
-            for anchor in [-3, 0, 1, 77, 499_773, 1 << 29] {
-                let at = |anchor: i32, along: i32| {
-                    let Repeats { first, scale } = Repeats::new(anchor, spacing);
+            for render_origin in [-3, 0, 1, 77, 499_773, 1 << 29] {
+                let at = |render_origin: i32, along: i32| {
+                    let Repeats { first, scale } = Repeats::new(render_origin, spacing);
                     (f64::from(first) + f64::from(along)) * f64::from(scale)
                 };
-                let apart = at(anchor, 500) - at(anchor + 500, 0);
-                assert_eq!(apart, apart.round(), "{spacing} m from {anchor}");
+                let apart = at(render_origin, 500) - at(render_origin + 500, 0);
+                assert_eq!(apart, apart.round(), "{spacing} m from {render_origin}");
             }
             assert!(f64::from(scale) * PERIOD_M / spacing <= 1.5 && f64::from(scale) * PERIOD_M / spacing > 0.7);
         }

@@ -5,11 +5,11 @@ pub mod features;
 pub mod forced;
 mod look;
 
-use crate::draw::{Draws, Hiding, Manner};
+use crate::draw::{DepthMode, DrawKinds, PipelineRequirements};
 use crate::height::{Field, Samples};
 use crate::texture::drape::Drape;
-use crate::texture::ground_maps::GroundCut;
-use crate::texture::picture_maps::Cut;
+use crate::texture::virtual_ground::VirtualGroundLayout;
+use crate::texture::virtual_overlay::VirtualTextureLayout;
 pub use features::{FEATURES, Feature, mip_levels};
 pub use forced::Forced;
 pub use look::{Colour, Look};
@@ -47,9 +47,9 @@ pub struct ScenePlan {
     /// Normals filter heights with the device's sampler.
     pub filtered: bool,
     /// What the technique's lists ask for.
-    pub manner: Manner,
+    pub requirements: PipelineRequirements,
     /// The draws that there are programs for.
-    pub draws: Draws,
+    pub draws: DrawKinds,
     /// The ground's materials are there, and looked up.
     pub detail: bool,
     /// Timestamps and pipeline statistics are taken.
@@ -61,11 +61,11 @@ pub struct ScenePlan {
     /// Texels of the picture that may be laid over (x, z).
     pub overlay: Option<[u32; 2]>,
     /// How it is cut where it is there in parts.
-    pub maps: Option<Cut>,
+    pub maps: Option<VirtualTextureLayout>,
     /// Where it lies over the field.
     pub drape: Drape,
     /// How texels of the ground are kept, if they are asked for.
-    pub ground: Option<GroundCut>,
+    pub ground: Option<VirtualGroundLayout>,
     /// What was kept and left out by hand.
     pub forced: Forced,
 }
@@ -103,7 +103,7 @@ impl ScenePlan {
     /// The plan for a field and a look, or which limit of the device the field exceeds, or that its bytes do not hold the
     /// few parts of the ground that there must be.
     pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
-        let (stored, is_endless) = (field.stored(), field.land().is_some());
+        let (stored, is_endless) = (field.stored(), field.procedural().is_some());
         let page_shift = page_shift(stored, device);
         let mut plan = Self {
             coded: matches!(field.samples(), Samples::Coded { .. }),
@@ -116,8 +116,8 @@ impl ScenePlan {
             wireframe: look.wireframe,
             page_shift,
             filtered: device.filters_heights && page_shift == 0,
-            manner: Manner::default(),
-            draws: Manner::default().draws,
+            requirements: PipelineRequirements::default(),
+            draws: PipelineRequirements::default().draws,
             detail: look.detail,
             measured: true,
             windowed: false,
@@ -130,7 +130,7 @@ impl ScenePlan {
         };
         plan.force();
         if look.colour.shows_ground() {
-            plan.ground = Some(GroundCut::new(field, look.texture_bytes, device.image_layers)?);
+            plan.ground = Some(VirtualGroundLayout::new(field, look.texture_bytes, device.image_layers)?);
         }
         let layers = plan.pages()[0] * plan.pages()[1];
         if layers > device.image_layers {
@@ -146,8 +146,8 @@ impl ScenePlan {
     }
 
     /// The plan for a technique whose lists ask for this.
-    pub fn with_manner(self, manner: Manner) -> Self {
-        let mut plan = Self { manner, draws: manner.draws, ..self };
+    pub fn with_requirements(self, requirements: PipelineRequirements) -> Self {
+        let mut plan = Self { requirements, draws: requirements.draws, ..self };
         plan.force();
         plan
     }
@@ -191,8 +191,9 @@ impl ScenePlan {
     ) -> Result<Self, String> {
         self.overlay = overlay;
         let is_whole = |size: &[u32; 2]| look.holds(*size) && size.iter().all(|&n| n <= device.image_side);
-        if let Some(size) = overlay.filter(|size| field.land().is_none() && !is_whole(size)) {
-            self.maps = Some(Cut::new(size, self.drape.repeats(), look.texture_bytes, device.image_layers)?);
+        if let Some(size) = overlay.filter(|size| field.procedural().is_none() && !is_whole(size)) {
+            self.maps =
+                Some(VirtualTextureLayout::new(size, self.drape.repeats(), look.texture_bytes, device.image_layers)?);
         }
         Ok(self)
     }
@@ -204,7 +205,7 @@ impl ScenePlan {
 
     /// Whether pictures need a depth buffer.
     pub fn has_depth(&self) -> bool {
-        self.manner.hiding == Hiding::ByDepth
+        self.requirements.depth_mode == DepthMode::Buffer
     }
 
     /// Texels of a page of the height texture (x, z).

@@ -11,7 +11,7 @@ use crate::gpu::probe;
 use crate::gpu::renderdoc::RenderDoc;
 use crate::lod::Technique;
 use crate::scene::probed::{self, ProbedDraw, ProbedFrame, Span};
-use crate::scene::{Copy, Scene, Stage, Times};
+use crate::scene::{Copy, Scene, SceneRenderer, Times};
 use crate::view::View;
 
 /// Rounds that are not counted: caches fill, clocks rise.
@@ -32,7 +32,7 @@ pub struct Measured {
     /// The frame with the median device time as a trace.
     pub trace: Value,
     forms: Vec<Form>,
-    stages: Vec<Stage>,
+    stages: Vec<SceneRenderer>,
     modes: Vec<Mode>,
     view: View,
 }
@@ -59,10 +59,10 @@ pub fn run(
     frames: u32,
     progress: impl Fn(u32, u32),
 ) -> Result<Measured> {
-    let mut stages = forms.iter().map(|form| stage(scene, form, view)).collect::<Result<Vec<_>>>()?;
+    let mut stages = forms.iter().map(|form| renderer(scene, form, view)).collect::<Result<Vec<_>>>()?;
     let mut modes = Vec::new();
-    for (k, (form, stage)) in forms.iter_mut().zip(&mut stages).enumerate() {
-        modes.extend(both_ways(k, form, stage, view)?);
+    for (k, (form, renderer)) in forms.iter_mut().zip(&mut stages).enumerate() {
+        modes.extend(both_ways(k, form, renderer, view)?);
     }
     let mut probed = Vec::new();
     for round in 0..WARM_UP + frames {
@@ -74,10 +74,10 @@ pub fn run(
         let turn = round as usize % modes.len();
         for k in (turn..modes.len()).chain(0..turn) {
             let mode = &mut modes[k];
-            let stage = &mut stages[mode.form];
-            stage.submission = Some(mode.submission);
-            let times = stage.draw(forms[mode.form].technique.as_mut(), view, Copy::Nothing)?;
-            let list = &stage.list;
+            let renderer = &mut stages[mode.form];
+            renderer.submission = Some(mode.submission);
+            let times = renderer.draw(forms[mode.form].technique.as_mut(), view, Copy::Nothing)?;
+            let list = &renderer.list;
             (mode.commands, mode.draws, mode.triangles) = (list.commands(), list.draws.len(), list.triangles());
             if round >= WARM_UP {
                 mode.times.push(times);
@@ -92,15 +92,15 @@ pub fn run(
     Ok(Measured { profile, trace, forms, stages, modes, view: *view })
 }
 
-fn stage(scene: &Scene, form: &Form, view: &View) -> Result<Stage> {
-    let plan = scene.plan.clone().with_manner(form.technique.manner());
-    Scene { plan: &plan, ..scene.clone() }.stage(form.technique.as_ref(), view.size)
+fn renderer(scene: &Scene, form: &Form, view: &View) -> Result<SceneRenderer> {
+    let plan = scene.plan.clone().with_requirements(form.technique.pipeline_requirements());
+    Scene { plan: &plan, ..scene.clone() }.renderer(form.technique.as_ref(), view.size)
 }
 
 /// The modes of a form, its own submission first.
-fn both_ways(k: usize, form: &mut Form, stage: &mut Stage, view: &View) -> Result<[Mode; 2]> {
-    stage.draw(form.technique.as_mut(), view, Copy::Nothing)?;
-    let own = stage.list.submission;
+fn both_ways(k: usize, form: &mut Form, renderer: &mut SceneRenderer, view: &View) -> Result<[Mode; 2]> {
+    renderer.draw(form.technique.as_mut(), view, Copy::Nothing)?;
+    let own = renderer.list.submission;
     // The host selects for the other one.
     let other = if own == Submission::Indirect { Submission::Direct } else { Submission::Indirect };
     let mode = |submission| Mode { form: k, submission, commands: 0, draws: 0, triangles: 0, times: Vec::new() };
@@ -118,10 +118,10 @@ impl Measured {
     pub fn capture_worst(&mut self, renderdoc: &RenderDoc) -> Result<(std::path::PathBuf, String)> {
         let rows = self.profile.modes.iter().zip(&self.modes);
         let (row, mode) = rows.max_by(|a, b| a.0.frame_us.total_cmp(&b.0.frame_us)).expect("a form has two modes");
-        let stage = &mut self.stages[mode.form];
-        stage.submission = Some(mode.submission);
+        let renderer = &mut self.stages[mode.form];
+        renderer.submission = Some(mode.submission);
         let technique = self.forms[mode.form].technique.as_mut();
-        let (_, path) = renderdoc.capture(|| stage.draw(technique, &self.view, Copy::Nothing))?;
+        let (_, path) = renderdoc.capture(|| renderer.draw(technique, &self.view, Copy::Nothing))?;
         Ok((path, format!("{} {}", row.form, row.submission)))
     }
 }
@@ -186,7 +186,7 @@ fn submission_name(submission: Submission) -> &'static str {
     match submission {
         Submission::Direct => "direct",
         Submission::Indirect => "indirect",
-        Submission::Driven => "driven",
+        Submission::GpuDriven => "driven",
     }
 }
 

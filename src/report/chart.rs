@@ -147,7 +147,7 @@ impl Chart {
     }
 
     fn body(&self, form: Form) -> String {
-        let frame = Frame::of(self, form);
+        let frame = PlotArea::of(self, form);
         let mut svg = frame.grid(self);
         if let Some((value, name)) = &self.limit {
             let y = frame.y(*value);
@@ -174,12 +174,12 @@ impl Chart {
 }
 
 /// The axes of one drawing.
-struct Frame {
+struct PlotArea {
     x: Range,
     y: Range,
 }
 
-impl Frame {
+impl PlotArea {
     fn of(chart: &Chart, form: Form) -> Self {
         let scale = |axis: &Axis| if form == Form::Own { axis.scale } else { Scale::Linear };
         let guides = chart.guide.iter().flat_map(|guide| guide.points.iter());

@@ -275,12 +275,12 @@ fn split<'a>(cases: impl Iterator<Item = &'a CaseResult>) -> Bars {
             series: result.case.series(),
             name: format!("{}, {} px", result.case.series(), number(result.case.tolerance_px)),
             values: known.into_iter().chain([rest]).collect(),
-            mark: time.floor_ms.map(|floor| (floor, "floor")),
+            mark: time.shading_only_ms.map(|shading_only| (shading_only, "shading only")),
         })
     };
     Bars {
         title: "What frame time is made of".to_string(),
-        about: "Medians. The black mark is the floor: the same picture from one full-screen pass.".to_string(),
+        about: "Medians. The black mark is shading alone: the same picture from one full-screen pass.".to_string(),
         label: "milliseconds".to_string(),
         parts: vec!["select", "record", "upload", "GPU", "rest"],
         rows: cases.filter_map(bar).collect(),

@@ -3,13 +3,13 @@
 
 mod axis;
 mod bars;
-mod battery;
 mod chart;
 mod figures;
 mod html;
 mod page;
 mod pictures;
 mod published;
+mod suite;
 mod tables;
 
 use std::path::{Path, PathBuf};
@@ -40,10 +40,10 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Draws the page of a stability battery's directory from its rows and returns its path.
+/// Draws the page of a stability suite's directory from its rows and returns its path.
 pub fn write_stress(folder: &Path) -> Result<PathBuf> {
     let stress = Stress::read(folder)?;
     let path = folder.join(PAGE);
-    results::save(&path, battery::page(&stress, folder).as_bytes())?;
+    results::save(&path, suite::page(&stress, folder).as_bytes())?;
     Ok(path)
 }

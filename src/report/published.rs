@@ -122,10 +122,10 @@ impl Rule {
 
     fn fastest(&self, results: &Results) -> Option<String> {
         let timed = self.timed(results);
-        let timed = timed.filter(|(_, time)| self.figure.as_ref().is_none_or(|name| time.figures.contains_key(name)));
+        let timed = timed.filter(|(_, time)| self.figure.as_ref().is_none_or(|name| time.stats.contains_key(name)));
         let (result, time) = timed.min_by(|a, b| a.1.frame_ms.value.total_cmp(&b.1.frame_ms.value))?;
         let figure =
-            self.figure.as_ref().map_or(String::new(), |name| format!("; {name}: {}", number(time.figures[name])));
+            self.figure.as_ref().map_or(String::new(), |name| format!("; {name}: {}", number(time.stats[name])));
         let frame_ms = time.frame_ms.value;
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
         let error = peers

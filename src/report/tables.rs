@@ -46,7 +46,7 @@ fn overdraw(result: &CaseResult) -> Option<String> {
 const TIMES: &[Column] = &[
     ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
     ("over base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
-    ("over floor", |r| r.time.as_ref()?.over_floor.as_ref().map(estimate)),
+    ("over shading only", |r| r.time.as_ref()?.over_shading_only.as_ref().map(estimate)),
     ("CPU, ms", |r| r.time.as_ref().map(|t| estimate(&t.cpu_ms))),
     ("CPU over base", |r| r.time.as_ref()?.cpu_over_base.as_ref().map(estimate)),
     ("p95, ms", |r| r.time.as_ref().map(|t| number(t.frame_p95_ms))),
@@ -58,8 +58,8 @@ const TIMES: &[Column] = &[
     ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
     ("below a pixel, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
     ("overdraw", overdraw),
-    ("held, %", |r| r.time.as_ref()?.held.map(|h| number(100.0 * h.settled))),
-    ("mean tolerance, px", |r| r.time.as_ref()?.held.map(|h| number(h.tolerance_px.mean))),
+    ("held, %", |r| r.time.as_ref()?.budget.map(|h| number(100.0 * h.settled))),
+    ("mean tolerance, px", |r| r.time.as_ref()?.budget.map(|h| number(h.tolerance_px.mean))),
     ("draws", |r| r.time.as_ref().map(|t| number(t.draws))),
     ("device bytes", |r| r.time.as_ref().map(|t| number(t.device_bytes as f64))),
 ];
@@ -79,9 +79,9 @@ const ERRORS: &[Column] = &[
     ("SSIM", |r| r.errors.as_ref()?.image.map(|i| number(i.ssim))),
     ("holes, px", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
     ("skirts, px", |r| r.errors.as_ref()?.skirt_pixels.map(|n| n.to_string())),
-    ("waited, frames", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| w.frames.to_string())),
-    ("and beyond, px", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| w.pixels.to_string())),
-    ("by at most, px", |r| r.errors.as_ref()?.waiting.filter(|w| w.frames > 0).map(|w| number(w.excess_px))),
+    ("waited, frames", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| w.frames.to_string())),
+    ("and beyond, px", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| w.pixels.to_string())),
+    ("by at most, px", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| number(w.excess_px))),
     ("watertight", |r| r.errors.as_ref()?.watertight.map(|is| if is { "yes" } else { "<b>no</b>" }.to_string())),
 ];
 

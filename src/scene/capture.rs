@@ -2,12 +2,12 @@
 
 use anyhow::Result;
 
-use super::Stage;
+use super::SceneRenderer;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Captured;
 use crate::draw::{DrawList, Geometry, Submission};
 use crate::gpu::capture::{Capture, Part};
-use crate::gpu::oracle::{self, Oracle, Summary};
+use crate::gpu::error_pass::{self, ErrorPass, Summary};
 use crate::height::surface::{Corner, doubled_area};
 use crate::lod::Technique;
 use crate::view::View;
@@ -21,7 +21,7 @@ pub struct AsDrawn {
     pub relative: [[f32; 3]; 3],
 }
 
-impl Stage {
+impl SceneRenderer {
     /// Whether the device can capture.
     pub fn captures(&self) -> bool {
         self.gpu.captures
@@ -47,13 +47,14 @@ impl Stage {
     /// single precision, for what is too big for [`crate::measure::geometric::errors`].
     pub fn errors(&mut self, technique: &dyn Technique, view: &View) -> Result<[Summary; 2]> {
         let resident = technique.resident();
-        let mut oracle: Option<Oracle> = None;
-        self.each_batch(resident, view, |stage, batch, list, records| {
-            if oracle.is_none() {
-                let capture = stage.capture.as_ref().expect("made before its first batch");
-                oracle = Some(Oracle::new(&stage.gpu, &stage.plan, stage.terrain.set_layout(), capture)?);
+        let mut error_pass: Option<ErrorPass> = None;
+        self.each_batch(resident, view, |renderer, batch, list, records| {
+            if error_pass.is_none() {
+                let capture = renderer.capture.as_ref().expect("made before its first batch");
+                error_pass =
+                    Some(ErrorPass::new(&renderer.gpu, &renderer.plan, renderer.terrain.set_layout(), capture)?);
             }
-            let oracle = oracle.as_mut().expect("just made");
+            let error_pass = error_pass.as_mut().expect("just made");
             let mut surface = Vec::new();
             for part in batch {
                 triangles(resident, list, part, records, |drawn, corners| {
@@ -63,24 +64,24 @@ impl Stage {
                     }
                 });
             }
-            let frame = stage.look.frame(&stage.field, view, stage.range);
-            for some in surface.chunks(oracle::TRIANGLES) {
-                let mut recording = stage.frames.begin()?;
+            let frame = renderer.look.frame(&renderer.field, view, renderer.range);
+            for some in surface.chunks(error_pass::TRIANGLES) {
+                let mut recording = renderer.frames.begin()?;
                 let nothing = DrawList {
                     fraction_bits: list.fraction_bits,
                     height_base: list.height_base,
                     ..DrawList::default()
                 };
-                stage.terrain.prepare(&mut recording, &frame, &nothing)?;
-                let scene = stage.terrain.scene_set(&recording);
-                oracle.record(&mut recording, scene, view.size, some)?;
-                stage.frames.submit(None, None)?;
-                stage.frames.finish()?;
-                oracle.collect(some.len());
+                renderer.terrain.prepare(&mut recording, &frame, &nothing)?;
+                let scene = renderer.terrain.scene_set(&recording);
+                error_pass.record(&mut recording, scene, view.size, some)?;
+                renderer.frames.submit(None, None)?;
+                renderer.frames.finish()?;
+                error_pass.collect(some.len());
             }
             Ok(())
         })?;
-        Ok(oracle.map_or([Summary::default(); 2], |oracle| oracle.summaries()))
+        Ok(error_pass.map_or([Summary::default(); 2], |error_pass| error_pass.summaries()))
     }
 
     /// Captures the last list batch by batch.
@@ -88,7 +89,7 @@ impl Stage {
         &mut self,
         resident: &Geometry,
         view: &View,
-        mut visit: impl FnMut(&mut Stage, &[Part], &DrawList, &[Captured]) -> Result<()>,
+        mut visit: impl FnMut(&mut SceneRenderer, &[Part], &DrawList, &[Captured]) -> Result<()>,
     ) -> Result<()> {
         if self.capture.is_none() {
             self.capture = Some(Capture::new(&self.gpu, &self.plan, self.terrain.set_layout())?);

@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result};
 
-use super::Stage;
+use super::SceneRenderer;
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::target::{self, Depth, Offscreen};
 use crate::plan::ScenePlan;
@@ -14,7 +14,7 @@ pub(super) fn attachment<'a>(plan: &ScenePlan, offscreen: &'a Offscreen) -> Opti
     if plan.has_depth() { offscreen.kept_depth() } else { None }
 }
 
-impl Stage {
+impl SceneRenderer {
     /// Draws the last list again with a depth buffer and copies that; the picture copied before stays. Nobody times it.
     pub(super) fn draw_deep(&mut self, view: &View) -> Result<()> {
         self.offscreen.add_depth(&self.gpu)?;

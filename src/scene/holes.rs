@@ -23,7 +23,7 @@ pub struct Truth {
 /// Where land is in a picture, pixel by pixel.
 struct Masks {
     width: usize,
-    land: Vec<bool>,
+    terrain: Vec<bool>,
     /// Pixels that land without data projects to, if there is such land.
     missing: Option<Vec<bool>>,
 }
@@ -60,7 +60,7 @@ fn real_holes(scene: &Scene, view: &View, picture: &image::RgbaImage, radius: us
     let wide = view.with_margin(margin);
     let masks = Masks::new(scene, &wide, &brute_force(scene, scene.field, &wide)?)?;
     let (inner, margin) = (inner as usize, margin as usize);
-    let mut drawn = vec![true; masks.land.len()];
+    let mut drawn = vec![true; masks.terrain.len()];
     for (row, covered) in covered(picture).chunks(inner).enumerate() {
         drawn[(row + margin) * masks.width + margin..][..inner].copy_from_slice(covered);
     }
@@ -71,21 +71,21 @@ fn real_holes(scene: &Scene, view: &View, picture: &image::RgbaImage, radius: us
 impl Masks {
     fn new(scene: &Scene, view: &View, picture: &image::RgbaImage) -> Result<Self> {
         let has_holes = scene.field.holes().count() > 0;
-        let missing = has_holes.then(|| missing_land(scene, view)).transpose()?;
-        Ok(Self { width: view.size[0] as usize, land: covered(picture), missing })
+        let missing = has_holes.then(|| missing_terrain(scene, view)).transpose()?;
+        Ok(Self { width: view.size[0] as usize, terrain: covered(picture), missing })
     }
 
     fn holes(&self, covered: &[bool], radius: usize) -> Vec<usize> {
-        let mut holes = picture::hole_pixels(covered, &self.land, self.width, radius);
+        let mut holes = picture::hole_pixels(covered, &self.terrain, self.width, radius);
         if let Some(missing) = &self.missing {
-            let missing = picture::widened(missing, self.width, radius);
+            let missing = picture::select_within_limits(missing, self.width, radius);
             holes.retain(|&k| !missing[k]);
         }
         holes
     }
 }
 
-fn missing_land(scene: &Scene, view: &View) -> Result<Vec<bool>> {
+fn missing_terrain(scene: &Scene, view: &View) -> Result<Vec<bool>> {
     let missing = Arc::new(scene.field.around_holes());
     let mut mask = covered(&brute_force(scene, &missing, view)?);
     // Holes smaller than a pixel may fall between pixel centres.
@@ -113,10 +113,13 @@ fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::
     let is_cave = field.ceiling().is_some();
     let entry = lod::find(if is_cave { sorted_strips::ENTRY.name } else { "brute-force" }).expect("in the table");
     let mut technique: Box<dyn Technique> = (entry.build)(Arc::clone(field), &Settings::defaults(entry));
-    let plan = scene.plan.clone().with_manner(technique.manner());
+    let plan = scene.plan.clone().with_requirements(technique.pipeline_requirements());
     let tolerance = Tolerance { px: if is_cave { EXACT_PX } else { view.tolerance.px }, ..view.tolerance };
     let view = View { tolerance, ..*view };
-    let shot = Scene { field, plan: &plan, ..scene.clone() }.shoot(technique.as_mut(), &view, 1)?;
-    ensure!(!is_cave || shot.list.widening == 1.0, "the cave has too many samples in sight for a picture of all");
-    Ok(shot.picture)
+    let rendered = Scene { field, plan: &plan, ..scene.clone() }.render(technique.as_mut(), &view, 1)?;
+    ensure!(
+        !is_cave || rendered.list.tolerance_scale == 1.0,
+        "the cave has too many samples in sight for a picture of all"
+    );
+    Ok(rendered.picture)
 }

@@ -14,12 +14,12 @@ use anyhow::{Context, Result};
 
 use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::{Frames, Timing};
+use crate::gpu::gpu_tile_cache::VirtualTextureStats;
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::slot::Part;
 use crate::gpu::target::Offscreen;
 use crate::gpu::terrain::Terrain;
-use crate::gpu::texture_slots::Figures;
-use crate::gpu::{Gpu, capture::Capture, floor::Floor, probe::Probe};
+use crate::gpu::{Gpu, capture::Capture, probe::Probe, shading_only::ShadingOnly};
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
@@ -41,10 +41,10 @@ pub struct Scene<'a> {
 }
 
 /// A scene made ready on the device for one technique and one size of pictures.
-pub struct Stage {
+pub struct SceneRenderer {
     frames: Frames,
     terrain: Terrain,
-    floor: Option<Floor>,
+    shading_only: Option<ShadingOnly>,
     capture: Option<Capture>,
     probe: Option<Probe>,
     offscreen: Offscreen,
@@ -79,7 +79,7 @@ pub struct Times {
 }
 
 /// One picture and how it came about.
-pub struct Shot {
+pub struct RenderResult {
     /// Colours; alpha says where land was drawn, half of it where a skirt was.
     pub picture: image::RgbaImage,
     /// What was drawn.
@@ -89,7 +89,7 @@ pub struct Shot {
     /// Device bytes in use while it was drawn.
     pub device_bytes: u64,
     /// The texels laid over in parts, if any are.
-    pub maps: Option<Figures>,
+    pub maps: Option<VirtualTextureStats>,
 }
 
 /// What a frame copies back to the host after the device's work was timed.
@@ -97,25 +97,25 @@ pub struct Shot {
 pub enum Copy {
     /// Nothing.
     Nothing,
-    /// The colours: [`Stage::picture`].
+    /// The colours: [`SceneRenderer::picture`].
     Picture,
-    /// Colours and depth: [`Stage::depth`] too.
+    /// Colours and depth: [`SceneRenderer::depth`] too.
     PictureAndDepth,
 }
 
 impl<'a> Scene<'a> {
     /// Makes it ready for a technique.
-    pub fn stage(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
-        let kept = technique.kept();
+    pub fn renderer(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<SceneRenderer> {
+        let kept = technique.device_geometry();
         let formats = Offscreen::formats(self.plan.has_depth());
         let mut offscreen = Offscreen::new(self.gpu, size)?;
         if self.plan.has_depth() {
             offscreen.add_depth(self.gpu)?;
         }
-        Ok(Stage {
+        Ok(SceneRenderer {
             frames: Frames::new(self.gpu, self.plan.measured)?,
             terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, kept, formats)?,
-            floor: None,
+            shading_only: None,
             capture: None,
             probe: None,
             offscreen,
@@ -132,19 +132,25 @@ impl<'a> Scene<'a> {
     }
 
     /// Draws one view `times` times; the times are medians.
-    pub fn shoot(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<Shot> {
-        let mut stage = self.stage(technique, view.size)?;
+    pub fn render(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<RenderResult> {
+        let mut renderer = self.renderer(technique, view.size)?;
         // Before anything is timed: a picture does not depend on how fast maps are made.
-        stage.settle(technique, view)?;
-        let drawn = (0..times.max(1)).map(|_| stage.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
+        renderer.settle(technique, view)?;
+        let drawn = (0..times.max(1)).map(|_| renderer.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().values().sum();
-        stage.complete()?;
-        let maps = stage.maps();
-        Ok(Shot { picture: stage.picture(), maps, list: stage.list, times: Times::median(drawn), device_bytes })
+        renderer.complete()?;
+        let maps = renderer.maps();
+        Ok(RenderResult {
+            picture: renderer.picture(),
+            maps,
+            list: renderer.list,
+            times: Times::median(drawn),
+            device_bytes,
+        })
     }
 }
 
-impl Stage {
+impl SceneRenderer {
     /// Waits until the texels laid over in parts are as fine as a view needs.
     pub fn settle(&mut self, technique: &mut dyn Technique, view: &View) -> Result<()> {
         if self.plan.reads_lists() {
@@ -154,21 +160,21 @@ impl Stage {
     }
 
     /// What is held of the texels laid over in parts, if any are.
-    pub fn maps(&self) -> Option<Figures> {
-        self.terrain.overlay.figures()
+    pub fn maps(&self) -> Option<VirtualTextureStats> {
+        self.terrain.overlay.stats()
     }
 
     /// Selects and draws a view, and waits until the device has finished. Where a selection on the device finds more than
     /// its tables hold, the host finds the tolerance at which it fits, and the frame is drawn again under that.
     pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let times = self.draw_once(technique, view, copy)?;
-        if self.list.submission != Submission::Driven || self.list.widening == 1.0 {
+        if self.list.submission != Submission::GpuDriven || self.list.tolerance_scale == 1.0 {
             return Ok(times);
         }
         let started = Instant::now();
         self.list.clear();
         technique.select(view, &mut self.list);
-        let (tolerance_scale, search_ms) = (self.list.widening, ms(started));
+        let (tolerance_scale, search_ms) = (self.list.tolerance_scale, ms(started));
         let wider = if tolerance_scale.is_finite() {
             self.draw_once(technique, &view.under_wider_tolerance(tolerance_scale), copy)?
         } else {
@@ -178,7 +184,7 @@ impl Stage {
             self.submission = submission;
             drawn?
         };
-        self.list.widening = tolerance_scale;
+        self.list.tolerance_scale = tolerance_scale;
         let frame_ms = times.frame_ms + search_ms + wider.frame_ms;
         Ok(Times { frame_ms, select_ms: times.select_ms + search_ms + wider.select_ms, ..wider })
     }
@@ -213,9 +219,9 @@ impl Stage {
     /// Selects on the device if that can and nothing else is asked for; and shows the list to what is laid over in parts.
     fn select(&mut self, technique: &mut dyn Technique, view: &View) {
         self.list.clear();
-        let own = self.submission.unwrap_or(Submission::Driven);
-        if own == Submission::Driven && self.terrain.driven().is_some() && !self.plan.reads_lists() {
-            technique.drive(view, &mut self.list);
+        let own = self.submission.unwrap_or(Submission::GpuDriven);
+        if own == Submission::GpuDriven && self.terrain.gpu_selector().is_some() && !self.plan.reads_lists() {
+            technique.select_on_gpu(view, &mut self.list);
         } else {
             technique.select(view, &mut self.list);
             self.list.submission = self.submission.unwrap_or(self.list.submission);
@@ -225,17 +231,17 @@ impl Stage {
 
     /// The draws that the device found itself, once the frame has finished.
     fn read_draws(&mut self) {
-        if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {
-            driven.read_draws(driven.newest(), &mut self.list);
+        if let (Submission::GpuDriven, Some(gpu_selector)) = (self.list.submission, self.terrain.gpu_selector()) {
+            gpu_selector.read_draws(gpu_selector.newest(), &mut self.list);
         }
     }
 
     /// Makes the list whole: instances that the device found itself are read back.
     pub fn complete(&mut self) -> Result<()> {
-        if let (Submission::Driven, Some(driven)) = (self.list.submission, self.terrain.driven()) {
+        if let (Submission::GpuDriven, Some(gpu_selector)) = (self.list.submission, self.terrain.gpu_selector()) {
             let count = self.list.draws.iter().map(|draw| draw.instances.end).max().unwrap_or(0);
             if self.list.instances.len() < count as usize {
-                self.list.instances = driven.read_instances(count as usize)?;
+                self.list.instances = gpu_selector.read_instances(count as usize)?;
             }
         }
         Ok(())
@@ -243,15 +249,15 @@ impl Stage {
 
     /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed
     /// the depth that the last frame left. `view` is that frame's.
-    pub fn draw_floor(&mut self, view: &View, copy: Copy) -> Result<Times> {
+    pub fn draw_shading_only(&mut self, view: &View, copy: Copy) -> Result<Times> {
         if !self.plan.has_depth() {
             self.draw_deep(view)?;
         }
-        if self.floor.is_none() {
+        if self.shading_only.is_none() {
             let layout = self.terrain.set_layout();
-            self.floor = Some(Floor::new(&self.gpu, &self.plan, layout, &self.offscreen)?);
+            self.shading_only = Some(ShadingOnly::new(&self.gpu, &self.plan, layout, &self.offscreen)?);
         }
-        let floor = self.floor.as_ref().expect("just made");
+        let shading_only = self.shading_only.as_ref().expect("just made");
         let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
         let started = Instant::now();
         let mut recording = self.frames.begin()?;
@@ -260,13 +266,13 @@ impl Stage {
         let upload_ms = ms(started);
         let recorded = Instant::now();
         let scene = self.terrain.scene_set(&recording);
-        floor.draw(&mut recording, &self.offscreen, scene)?;
+        shading_only.draw(&mut recording, &self.offscreen, scene)?;
         if copy != Copy::Nothing {
             self.offscreen.read_back(&recording);
         }
         let record_ms = ms(recorded);
         self.frames.submit(None, None)?;
-        self.frames.finish().context("drawing the floor")?;
+        self.frames.finish().context("drawing the shading-only baseline")?;
         Ok(Times { frame_ms: ms(started), select_ms: 0.0, upload_ms, record_ms, gpu: self.frames.timing.clone() })
     }
 

@@ -4,17 +4,17 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use super::{Stage, deep, ms};
+use super::{SceneRenderer, deep, ms};
 use crate::draw::{DrawList, Limits};
 use crate::gpu::slot::Part;
 use crate::gpu::target;
 use crate::lod::Technique;
 use crate::view::View;
 
-impl Stage {
+impl SceneRenderer {
     /// Selects, and submits what is ready before all is; how much of the list that was.
     pub(super) fn select_in_parts(&mut self, technique: &mut dyn Technique, view: &View) -> Result<Limits> {
-        if self.submission.is_some() || self.terrain.driven().is_some() || self.plan.reads_lists() {
+        if self.submission.is_some() || self.terrain.gpu_selector().is_some() || self.plan.reads_lists() {
             self.select(technique, view);
             return Ok(Limits::default());
         }

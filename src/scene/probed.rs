@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::{Copy, Stage, deep};
+use super::{Copy, SceneRenderer, deep};
 use crate::draw::{Draw, DrawList, Submission};
 use crate::gpu::clock::Clock;
 use crate::gpu::probe::{self, Counts, Measured, Piece, Probe};
@@ -99,7 +99,7 @@ impl Steps {
     }
 }
 
-impl Stage {
+impl SceneRenderer {
     /// Selects and draws a view with queries around every draw, up to [`probe::DRAWS`] of them, and waits until the
     /// device has finished. `name` is the technique's. Where the device finds the draws itself, a frame before tells
     /// which there are.
@@ -112,7 +112,7 @@ impl Stage {
         let found = std::mem::take(&mut self.list);
         let mut steps = Steps { origin: Instant::now(), done: Vec::new() };
         steps.time("select", || self.select(technique, view));
-        if self.list.submission == Submission::Driven {
+        if self.list.submission == Submission::GpuDriven {
             (self.list.draws, self.list.instances) = (found.draws, found.instances);
         }
         let cut = probe::pieces(&self.list.draws, probe::DRAWS);
@@ -132,7 +132,7 @@ impl Stage {
     }
 
     fn find_draws(&mut self, technique: &mut dyn Technique, view: &View) -> Result<()> {
-        if self.terrain.driven().is_some() {
+        if self.terrain.gpu_selector().is_some() {
             self.draw(technique, view, Copy::Nothing)?;
             self.complete()?;
         }

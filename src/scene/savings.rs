@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use super::{Copy, Scene, Stage, Times, median};
+use super::{Copy, Scene, SceneRenderer, Times, median};
 use crate::gpu::pipelines;
 use crate::lod::Technique;
 use crate::plan::{FEATURES, Feature, ScenePlan, forced};
@@ -48,7 +48,7 @@ pub fn measure(
 ) -> Result<(Lean, Vec<Saving>)> {
     let [technique, other] = techniques;
     let before = bytes(scene);
-    let mut stage = settled(scene, technique.as_mut(), view)?;
+    let mut renderer = settled(scene, technique.as_mut(), view)?;
     let own = bytes(scene) - before;
     let mut times = Vec::new();
     let mut savings = Vec::new();
@@ -59,10 +59,10 @@ pub fn measure(
         let bytes = bytes(scene) - before - own;
         let (mut lean, mut full) = (Vec::new(), Vec::new());
         for _ in 0..frames.max(1) {
-            lean.push(device_ms(&stage.draw(technique.as_mut(), view, Copy::Nothing)?));
+            lean.push(device_ms(&renderer.draw(technique.as_mut(), view, Copy::Nothing)?));
             full.push(device_ms(&with.draw(other.as_mut(), view, Copy::Nothing)?));
         }
-        let differs = differences(&stage, &with);
+        let differs = differences(&renderer, &with);
         let [pipelines, instructions] = more(pipelines::size(&plan), pipelines::size(scene.plan));
         times.extend_from_slice(&lean);
         let time = median(full) / median(lean);
@@ -90,19 +90,19 @@ fn left_out(scene: &Scene) -> Result<Vec<(&'static Feature, ScenePlan)>> {
 }
 
 /// The stage of a scene once its technique has settled in a view, with the view's picture.
-fn settled(scene: &Scene, technique: &mut dyn Technique, view: &View) -> Result<Stage> {
-    let mut stage = scene.stage(technique, view.size)?;
-    for _ in 0..MOST_FRAMES {
-        stage.draw(technique, view, Copy::Picture)?;
+fn settled(scene: &Scene, technique: &mut dyn Technique, view: &View) -> Result<SceneRenderer> {
+    let mut renderer = scene.renderer(technique, view.size)?;
+    for _ in 0..MAX_FRAMES {
+        renderer.draw(technique, view, Copy::Picture)?;
         if technique.is_settled() {
-            return Ok(stage);
+            return Ok(renderer);
         }
     }
     None.context("the technique does not settle in the view")
 }
 
 /// Within so many frames of one view every technique settles.
-const MOST_FRAMES: usize = 1000;
+const MAX_FRAMES: usize = 1000;
 
 fn bytes(scene: &Scene) -> i64 {
     scene.gpu.device_bytes().values().sum::<u64>() as i64
@@ -113,7 +113,7 @@ fn device_ms(times: &Times) -> f64 {
     if times.gpu.total_ms > 0.0 { times.gpu.total_ms } else { times.frame_ms }
 }
 
-fn differences(a: &Stage, b: &Stage) -> (u8, usize) {
+fn differences(a: &SceneRenderer, b: &SceneRenderer) -> (u8, usize) {
     let (a, b) = (a.picture(), b.picture());
     let apart = |(a, b): (&image::Rgba<u8>, &image::Rgba<u8>)| a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max();
     let apart: Vec<u8> = a.pixels().zip(b.pixels()).filter_map(apart).collect();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::fields::hills;
 use super::forms::Form;
-use super::laws::{Broken, Subject, TOLERANCES_PX};
+use super::invariants::{Subject, TOLERANCES_PX, Violation};
 use super::{Case, Finding, Kind, views};
 use crate::draw::DrawList;
 
@@ -28,8 +28,8 @@ fn two_of_a_kind(form: &Form) -> Vec<Finding> {
         });
         lists[0] != lists[1]
     });
-    let broken = differs.map(|view| Broken::new(view, "two techniques made alike draw two lists"));
-    vec![Finding::holds("same frame twice, same bytes", broken.map_or(Ok(()), Err))]
+    let violation = differs.map(|view| Violation::new(view, "two techniques made alike draw two lists"));
+    vec![Finding::holds("same frame twice, same bytes", violation.map_or(Ok(()), Err))]
 }
 
 /// All of a list that reaches the device.
@@ -54,16 +54,16 @@ fn fine_steps(form: &Form) -> Vec<Finding> {
     let mut subject =
         Subject { field: &field, technique: &mut *technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
     let mut before = u64::MAX;
-    let mut worst: (f64, Option<Broken>) = (0.0, None);
+    let mut worst: (f64, Option<Violation>) = (0.0, None);
     for px in (0..STEPS).map(|k| 0.125 * 1.01f64.powi(k)) {
         let view = views::with_tolerance(&named.1, px);
         let Ok(list) = subject.select(&view) else { continue };
         let more = list.triangles().saturating_sub(before) as f64;
         if more > worst.0 {
             let why = format!("{} triangles at {px} px, {before} at 1 % less", list.triangles());
-            worst = (more, Some(Broken::new((named.0, view), why)));
+            worst = (more, Some(Violation::new((named.0, view), why)));
         }
         before = list.triangles();
     }
-    vec![Finding { broken: worst.1, ..Finding::within("triangles more at a wider tolerance", worst.0, 0.0) }]
+    vec![Finding { violation: worst.1, ..Finding::within("triangles more at a wider tolerance", worst.0, 0.0) }]
 }

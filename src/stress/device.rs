@@ -1,11 +1,11 @@
-//! What a device draws in the battery: no sky through land, the triangles that the list says, the same bytes twice.
+//! What a device draws in the suite: no sky through land, the triangles that the list says, the same bytes twice.
 
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 
-use super::laws::Broken;
-use super::{Case, Eye, Finding, Flight, Form, Kind, Land};
+use super::invariants::Violation;
+use super::{Case, Finding, Flight, Form, ImageChecker, Kind, StressTerrain};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::Gpu;
@@ -13,17 +13,17 @@ use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
 use crate::scene::holes::Truth;
-use crate::scene::{Copy, Scene, Stage};
+use crate::scene::{Copy, Scene, SceneRenderer};
 use crate::view::View;
 
 /// Of a flight so many frames are drawn.
 const FRAMES: usize = 8;
 
 /// Pictures are at most so many pixels wide and high: larger views are drawn smaller, with the same lens.
-const MOST_PX: u32 = 128;
+const MAX_PX: u32 = 128;
 
 /// Looks through a device.
-pub struct DeviceEye {
+pub struct DeviceImageChecker {
     gpu: Arc<Gpu>,
     look: Look,
 }
@@ -31,12 +31,12 @@ pub struct DeviceEye {
 /// What was seen so far.
 struct Seen {
     holes: usize,
-    holes_at: Option<Broken>,
-    drawn: Result<(), Broken>,
-    again: Result<(), Broken>,
+    holes_at: Option<Violation>,
+    drawn: Result<(), Violation>,
+    again: Result<(), Violation>,
 }
 
-impl DeviceEye {
+impl DeviceImageChecker {
     /// Through this one.
     pub fn new(gpu: Arc<Gpu>) -> Self {
         Self { gpu, look: Look::default() }
@@ -49,12 +49,12 @@ impl DeviceEye {
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_manner(technique.manner()))
+        Ok(plan.with_requirements(technique.pipeline_requirements()))
     }
 
-    fn stage(&self, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Result<Stage> {
+    fn renderer(&self, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Result<SceneRenderer> {
         let plan = self.plan(field, technique)?;
-        self.scene(field, &plan).stage(technique, size)
+        self.scene(field, &plan).renderer(technique, size)
     }
 
     fn scene<'a>(&'a self, field: &'a Arc<Field>, plan: &'a ScenePlan) -> Scene<'a> {
@@ -65,14 +65,14 @@ impl DeviceEye {
     fn look_at(&self, field: &Arc<Field>, form: &Form, views: &[(&'static str, View)]) -> Result<Vec<Finding>> {
         let mut technique = form.entry.prepare(field, &form.settings).map_err(anyhow::Error::msg)?;
         let mut seen = Seen { holes: 0, holes_at: None, drawn: Ok(()), again: Ok(()) };
-        let mut stage: Option<(Stage, [u32; 2])> = None;
+        let mut renderer: Option<(SceneRenderer, [u32; 2])> = None;
         for (name, view) in views {
-            let view = View { size: view.size.map(|side| side.min(MOST_PX)), ..*view };
-            if stage.as_ref().is_none_or(|(_, size)| *size != view.size) {
-                stage = Some((self.stage(field, technique.as_ref(), view.size)?, view.size));
+            let view = View { size: view.size.map(|side| side.min(MAX_PX)), ..*view };
+            if renderer.as_ref().is_none_or(|(_, size)| *size != view.size) {
+                renderer = Some((self.renderer(field, technique.as_ref(), view.size)?, view.size));
             }
-            let Some((stage, _)) = &mut stage else { continue };
-            self.frame(field, technique.as_mut(), stage, (name, view), &mut seen).context(*name)?;
+            let Some((renderer, _)) = &mut renderer else { continue };
+            self.frame(field, technique.as_mut(), renderer, (name, view), &mut seen).context(*name)?;
         }
         Ok(seen.findings())
     }
@@ -81,30 +81,30 @@ impl DeviceEye {
         &self,
         field: &Arc<Field>,
         technique: &mut dyn Technique,
-        stage: &mut Stage,
+        renderer: &mut SceneRenderer,
         named: (&'static str, View),
         seen: &mut Seen,
     ) -> Result<()> {
         let view = &named.1;
-        let broken = |why: &str| Err(Broken::new(named, why));
-        stage.draw(technique, view, Copy::PictureAndDepth)?;
-        stage.complete()?;
-        let picture = stage.picture();
+        let violation = |why: &str| Err(Violation::new(named, why));
+        renderer.draw(technique, view, Copy::PictureAndDepth)?;
+        renderer.complete()?;
+        let picture = renderer.picture();
         let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
         let scene = self.scene(field, &plan);
         let holes = Truth::new(&scene, view)?.hole_pixels(&scene, view, &picture)?.len();
         if holes > 0 && seen.holes_at.is_none() {
-            seen.holes_at = Some(Broken::new(named, format!("{holes} pixels of sky where land is")));
+            seen.holes_at = Some(Violation::new(named, format!("{holes} pixels of sky where land is")));
         }
         seen.holes += holes;
-        if stage.captures() && !is_as_listed(field, technique, stage, view)? {
-            seen.drawn = seen.drawn.clone().and(broken("the device draws other triangles than the list says"));
+        if renderer.captures() && !is_as_listed(field, technique, renderer, view)? {
+            seen.drawn = seen.drawn.clone().and(violation("the device draws other triangles than the list says"));
         }
         if technique.is_settled() {
-            stage.draw(technique, view, Copy::PictureAndDepth)?;
-            stage.complete()?;
-            if technique.is_settled() && stage.picture() != picture {
-                seen.again = seen.again.clone().and(broken("the same frame has another picture"));
+            renderer.draw(technique, view, Copy::PictureAndDepth)?;
+            renderer.complete()?;
+            if technique.is_settled() && renderer.picture() != picture {
+                seen.again = seen.again.clone().and(violation("the same frame has another picture"));
             }
         }
         Ok(())
@@ -112,13 +112,13 @@ impl DeviceEye {
 }
 
 /// Whether the triangles captured on the device are those of the list, to the bit.
-fn is_as_listed(field: &Field, technique: &dyn Technique, stage: &mut Stage, view: &View) -> Result<bool> {
+fn is_as_listed(field: &Field, technique: &dyn Technique, renderer: &mut SceneRenderer, view: &View) -> Result<bool> {
     let placing = Frame::placing(field, view);
     let expanded = [
-        expand::triangles(field, &placing, technique.resident(), &stage.list),
-        expand::skirts(field, &placing, technique.resident(), &stage.list),
+        expand::triangles(field, &placing, technique.resident(), &renderer.list),
+        expand::skirts(field, &placing, technique.resident(), &renderer.list),
     ];
-    let captured = stage.capture(technique, view)?;
+    let captured = renderer.capture(technique, view)?;
     Ok(captured.iter().zip(&expanded).all(|(there, here)| there.iter().map(|t| t.drawn).eq(here.iter().copied())))
 }
 
@@ -126,18 +126,18 @@ impl Seen {
     fn findings(self) -> Vec<Finding> {
         let holes = Finding::within("pixels of sky through land", self.holes as f64, 0.0);
         vec![
-            Finding { broken: self.holes_at, ..holes },
+            Finding { violation: self.holes_at, ..holes },
             Finding::holds("the device draws the list", self.drawn),
             Finding::holds("same frame twice, same picture", self.again),
         ]
     }
 }
 
-impl Eye for DeviceEye {
+impl ImageChecker for DeviceImageChecker {
     fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding> {
         let (field, views) = match &case.kind {
-            Kind::Land(land) => {
-                let Land { field, views } = land();
+            Kind::Terrain(terrain) => {
+                let StressTerrain { field, views } = terrain();
                 (field, views)
             }
             Kind::Flight(flight) => {
@@ -156,10 +156,10 @@ impl Eye for DeviceEye {
 
     fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage> {
         let mut technique = form.entry.prepare(field, &form.settings).ok()?;
-        let view = View { size: view.size.map(|side| side.clamp(MOST_PX / 2, 4 * MOST_PX)), ..*view };
-        let mut stage = self.stage(field, technique.as_ref(), view.size).ok()?;
-        stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).ok()?;
-        stage.complete().ok()?;
-        Some(stage.picture())
+        let view = View { size: view.size.map(|side| side.clamp(MAX_PX / 2, 4 * MAX_PX)), ..*view };
+        let mut renderer = self.renderer(field, technique.as_ref(), view.size).ok()?;
+        renderer.draw(technique.as_mut(), &view, Copy::PictureAndDepth).ok()?;
+        renderer.complete().ok()?;
+        Some(renderer.picture())
     }
 }

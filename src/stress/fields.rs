@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{Case, Kind, Land, views};
+use super::{Case, Kind, StressTerrain, views};
 use crate::height::synth::{self, noise};
 use crate::height::{Field, Holes, Options, Samples, load_bytes};
 
-const fn case(name: &'static str, land: fn() -> Land) -> Case {
-    Case { family: "data", name, kind: Kind::Land(land) }
+const fn case(name: &'static str, terrain: fn() -> StressTerrain) -> Case {
+    Case { family: "data", name, kind: Kind::Terrain(terrain) }
 }
 
 /// The family `data`.
@@ -30,14 +30,14 @@ pub const CASES: &[Case] = &[
     case("nothing above the sea", || seen(lowered(hills([81, 66], [10.0; 2], 300.0), 4000.0))),
 ];
 
-fn of_kind(kind: synth::Kind, size: [u32; 2]) -> Land {
+fn of_kind(kind: synth::Kind, size: [u32; 2]) -> StressTerrain {
     seen(synth::synth(kind, size, 3))
 }
 
 /// With the views of the laws.
-pub fn seen(field: Field) -> Land {
+pub fn seen(field: Field) -> StressTerrain {
     let field = Arc::new(field);
-    Land { views: views::views(&field), field }
+    StressTerrain { views: views::views(&field), field }
 }
 
 fn made([w, h]: [u32; 2], spacing: [f64; 2], height: impl Fn(u32, u32) -> f32) -> Field {
@@ -68,14 +68,14 @@ fn lowered(field: Field, by_m: f32) -> Field {
 /// Bare floats as a file has them: what is no number and what is no data becomes a hole.
 fn islands() -> Field {
     let size = [99u32, 70];
-    let land = hills(size, [10.0; 2], 300.0);
+    let terrain = hills(size, [10.0; 2], 300.0);
     let sample = |k: u32| {
         let [i, j] = [k % size[0], k / size[0]].map(f64::from);
         match k {
             _ if (i - 30.0).hypot(j - 30.0) < 14.0 => f32::NAN,
             _ if i > 80.0 + j / 9.0 => -9999.0,
             _ if noise::white(k.into(), 5, 7) > 0.98 => f32::INFINITY,
-            _ => land.samples().height(k as usize),
+            _ => terrain.samples().height(k as usize),
         }
     };
     let bytes: Vec<u8> = (0..size[0] * size[1]).flat_map(|k| sample(k).to_le_bytes()).collect();

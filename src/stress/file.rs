@@ -21,7 +21,7 @@ pub const CASES: &[Case] = &[
 ];
 
 /// The most samples that these loads may make.
-const MOST_SAMPLES: u64 = 1 << 16;
+const MAX_SAMPLES: u64 = 1 << 16;
 
 /// A small file.
 struct Small {
@@ -59,7 +59,7 @@ impl Tally {
                     fault(|tally| &mut tally.nameless);
                 }
             }
-            Ok(loaded) if loaded.field.samples().len() as u64 > MOST_SAMPLES => fault(|tally| &mut tally.too_many),
+            Ok(loaded) if loaded.field.samples().len() as u64 > MAX_SAMPLES => fault(|tally| &mut tally.too_many),
             Ok(_) => {}
         }
         Some(loaded)
@@ -73,7 +73,7 @@ impl Tally {
             none("panics", panics),
             none("errors that do not name the file in one line", nameless),
             none("fields larger than allowed", too_many),
-            Finding::told("loads", loads as f64),
+            Finding::reported("loads", loads as f64),
         ]
     }
 }
@@ -86,7 +86,7 @@ fn small_files(extensions: &[&str]) -> Vec<Small> {
         let path = folder.path().join(format!("small.{extension}"));
         save(&field, &path).expect("a small file is written");
         let raw = (*extension == "raw").then(|| "7x5:u16le".parse().expect("a layout"));
-        let options = Options { raw, max_samples: MOST_SAMPLES, ..Options::default() };
+        let options = Options { raw, max_samples: MAX_SAMPLES, ..Options::default() };
         Small { name: format!("small.{extension}"), bytes: std::fs::read(path).expect("it was written"), options }
     };
     extensions.iter().map(small).collect()
@@ -133,7 +133,7 @@ fn giants() -> Vec<Finding> {
     let mut accepted = 0;
     let mut claim = |name: &str, bytes: &[u8], raw: Option<&str>| {
         let raw = raw.map(|layout| layout.parse().expect("a layout"));
-        let options = Options { raw, max_samples: MOST_SAMPLES, ..Options::default() };
+        let options = Options { raw, max_samples: MAX_SAMPLES, ..Options::default() };
         let small = Small { name: name.to_string(), bytes: bytes.to_vec(), options };
         accepted += u32::from(tally.load(&small, bytes, || "a giant".to_string()).is_some_and(|loaded| loaded.is_ok()));
     };

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::Finding;
 use super::forms::Form;
-use super::land::all_numbers;
-use super::laws::{Broken, SLACK};
+use super::invariants::{SLACK, Violation};
+use super::terrain::all_numbers;
 use crate::draw::DrawList;
 use crate::height::Field;
 use crate::lod::Technique;
@@ -23,7 +23,7 @@ pub struct Flight {
 /// Flies with a technique and holds every frame against what each frame keeps.
 pub fn examine(flight: &Flight, form: &Form) -> Vec<Finding> {
     let mut technique = (form.entry.build)(Arc::clone(&flight.field), &form.settings);
-    let mut check = Check { surface: Ok(()), numbers: Ok(()), error: 0.0, worst: None, waiting: 0 };
+    let mut check = Check { surface: Ok(()), numbers: Ok(()), error: 0.0, worst: None, pending: 0 };
     for view in &flight.views {
         let mut list = DrawList::default();
         technique.select(view, &mut list);
@@ -34,43 +34,43 @@ pub fn examine(flight: &Flight, form: &Form) -> Vec<Finding> {
 
 /// What was found so far.
 struct Check {
-    surface: Result<(), Broken>,
-    numbers: Result<(), Broken>,
+    surface: Result<(), Violation>,
+    numbers: Result<(), Violation>,
     /// The largest over its tolerance.
     error: f64,
-    worst: Option<Broken>,
+    worst: Option<Violation>,
     /// Frames with something coarser than it should be.
-    waiting: usize,
+    pending: usize,
 }
 
 impl Check {
     fn frame(&mut self, field: &Field, technique: &dyn Technique, view: &View, list: &DrawList) {
-        let broken = |why: String| Broken::new(("a frame", *view), why);
-        let (seams, resident) = (technique.manner().seams, technique.resident());
+        let violation = |why: String| Violation::new(("a frame", *view), why);
+        let (seams, resident) = (technique.pipeline_requirements().seams, technique.resident());
         let proof = watertight::prove_list(field, view, seams, resident, list);
-        let proof = proof.map(|_| ()).map_err(|why| broken(why.to_string()));
+        let proof = proof.map(|_| ()).map_err(|why| violation(why.to_string()));
         self.surface = std::mem::replace(&mut self.surface, Ok(())).and(proof);
-        let numbers = all_numbers(field, technique, view, list).map_err(broken);
+        let numbers = all_numbers(field, technique, view, list).map_err(violation);
         self.numbers = std::mem::replace(&mut self.numbers, Ok(())).and(numbers);
-        self.waiting += usize::from(list.waiting > 0);
-        if technique.keeps_tolerance() && list.waiting == 0 {
+        self.pending += usize::from(list.pending > 0);
+        if technique.keeps_tolerance() && list.pending == 0 {
             let errors = geometric::errors(field, view, resident, list);
             let share = errors.screen_px.max / view.tolerance.px;
             if share.is_nan() || share > self.error {
                 let why = format!("{} px of {} at {:?}", errors.screen_px.max, view.tolerance.px, errors.screen_at);
-                (self.error, self.worst) = (share, Some(broken(why)));
+                (self.error, self.worst) = (share, Some(violation(why)));
             }
         }
     }
 
     fn findings(self) -> Vec<Finding> {
         let error = Finding::within("screen error, tolerances", self.error, 1.0 + SLACK);
-        let broken = if error.passes() { None } else { self.worst };
+        let violation = if error.passes() { None } else { self.worst };
         vec![
             Finding::holds("one surface in every frame", self.surface),
-            Finding { broken, ..error },
+            Finding { violation, ..error },
             Finding::holds("no NaN, no subnormal, weights in [0, 1]", self.numbers),
-            Finding::told("frames in which something waits", self.waiting as f64),
+            Finding::reported("frames in which something waits", self.pending as f64),
         ]
     }
 }

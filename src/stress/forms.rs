@@ -1,4 +1,4 @@
-//! Forms of techniques that the battery tries.
+//! Forms of techniques that the suite tries.
 
 use crate::lod::{self, Entry, Need, Settings, TECHNIQUES, Values};
 

@@ -44,8 +44,8 @@ pub enum Way {
     Product,
 }
 
-/// The ways, and what they are called in the battery's rows.
-pub const WAYS: [(Way, &str); 3] = [
+/// The ways, and what they are called in the suite's rows.
+pub const MORPH_RANGES: [(Way, &str); 3] = [
     (Way::World, "world coordinates in single precision, px"),
     (Way::Relative, "relative to the camera, px"),
     (Way::Product, "as it is drawn, px"),
@@ -92,9 +92,9 @@ impl Jitter {
 pub fn findings(origin_m: f64) -> Vec<Finding> {
     let finding = |(way, name): (Way, &'static str)| {
         let px = Jitter::of(origin_m, way).max_px();
-        if way == Way::Product { Finding::within(name, px, LIMIT_PX) } else { Finding::told(name, px) }
+        if way == Way::Product { Finding::within(name, px, LIMIT_PX) } else { Finding::reported(name, px) }
     };
-    WAYS.map(finding).to_vec()
+    MORPH_RANGES.map(finding).to_vec()
 }
 
 /// A camera that creeps over the land.
@@ -146,7 +146,7 @@ pub fn save_maps(folder: &Path) -> Result<Vec<Picture>> {
     const ENLARGED: u32 = 3;
     let mut pictures = Vec::new();
     for (origin_m, place) in PLACES {
-        for (way, name) in WAYS {
+        for (way, name) in MORPH_RANGES {
             let jitter = Jitter::of(origin_m, way);
             let [w, h] = jitter.size;
             let map = resize(&jitter.map(), ENLARGED * w, ENLARGED * h, FilterType::Nearest);

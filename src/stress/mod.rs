@@ -1,24 +1,24 @@
-//! The stability battery: every technique on stiff and extreme fields, positions, views and times; the budget
+//! The stability suite: every technique on stiff and extreme fields, positions, views and times; the budget
 //! controller on loads that are hard to hold; the loaders on broken files. A case passes when the picture and the
 //! numbers are right, not when nothing crashed.
 //!
 //! A case is a row of [`FAMILIES`]; what is found in it, a [`Row`] for each technique and check. A technique that is new
-//! in the table is in the battery.
+//! in the table is in the suite.
 
 mod arithmetic;
 mod fields;
 mod file;
 mod flight;
 pub mod forms;
+pub mod invariants;
 pub mod jitter;
-mod land;
-pub mod laws;
-pub mod plants;
 mod position;
 pub mod rows;
 pub mod saved;
+pub mod simulated_loads;
 pub mod stiff;
 pub mod sweep;
+mod terrain;
 mod time;
 pub mod views;
 
@@ -37,9 +37,9 @@ use crate::view::View;
 
 pub use self::flight::Flight;
 pub use self::forms::Form;
-pub use self::land::Land;
-use self::laws::Broken;
+use self::invariants::Violation;
 pub use self::rows::{Picture, Row, SCHEMA, Stress};
+pub use self::terrain::StressTerrain;
 
 /// What a check found.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ pub struct Finding {
     /// The most that passes; `None`: it is only told.
     pub limit: Option<f64>,
     /// Where it failed, and how.
-    pub broken: Option<Broken>,
+    pub violation: Option<Violation>,
     /// How it failed, where no view is to blame.
     pub why: Option<String>,
 }
@@ -59,18 +59,18 @@ pub struct Finding {
 impl Finding {
     /// A value that is at most a limit.
     pub fn within(check: &'static str, value: f64, limit: f64) -> Self {
-        Self { check, value, limit: Some(limit), broken: None, why: None }
+        Self { check, value, limit: Some(limit), violation: None, why: None }
     }
 
     /// A value that is only told: what others are compared with.
-    pub fn told(check: &'static str, value: f64) -> Self {
-        Self { check, value, limit: None, broken: None, why: None }
+    pub fn reported(check: &'static str, value: f64) -> Self {
+        Self { check, value, limit: None, violation: None, why: None }
     }
 
     /// 0 where something holds, else 1.
-    pub fn holds(check: &'static str, outcome: Result<(), Broken>) -> Self {
-        let broken = outcome.err();
-        Self { broken: broken.clone(), ..Self::within(check, f64::from(u8::from(broken.is_some())), 0.0) }
+    pub fn holds(check: &'static str, outcome: Result<(), Violation>) -> Self {
+        let violation = outcome.err();
+        Self { violation: violation.clone(), ..Self::within(check, f64::from(u8::from(violation.is_some())), 0.0) }
     }
 
     /// The same, with how it failed.
@@ -87,7 +87,7 @@ impl Finding {
 /// What is done in a case.
 pub enum Kind {
     /// Every technique draws a field from views, and every law is held against what it draws.
-    Land(fn() -> Land),
+    Terrain(fn() -> StressTerrain),
     /// Every technique, in every word of its settings, is flown; each frame is one surface within its tolerance.
     Flight(fn() -> Flight),
     /// Something of its own is done with every technique.
@@ -96,7 +96,7 @@ pub enum Kind {
     Alone(&'static str, fn() -> Vec<Finding>),
 }
 
-/// A row of the battery.
+/// A row of the suite.
 pub struct Case {
     /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: &'static str,
@@ -106,7 +106,7 @@ pub struct Case {
     pub kind: Kind,
 }
 
-/// The battery, family by family.
+/// The suite, family by family.
 pub const FAMILIES: &[&[Case]] = &[
     fields::CASES,
     position::CASES,
@@ -124,7 +124,7 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
 }
 
 /// Looks at what a device draws.
-pub trait Eye {
+pub trait ImageChecker {
     /// What it finds in the pictures of a case.
     fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding>;
 
@@ -157,14 +157,14 @@ impl Trial {
 
     /// Whether a device draws it, if there is one: a technique with its defaults and each variant.
     pub fn is_drawn(&self) -> bool {
-        let has_picture = matches!(self.case.kind, Kind::Land(_) | Kind::Flight(_));
+        let has_picture = matches!(self.case.kind, Kind::Terrain(_) | Kind::Flight(_));
         has_picture && self.form.as_ref().is_some_and(|form| form.choices.is_empty())
     }
 
     /// What is found without a device. A panic is a finding.
     pub fn run(&self) -> Vec<Finding> {
         let findings = catch_unwind(AssertUnwindSafe(|| match (&self.case.kind, &self.form) {
-            (Kind::Land(land), Some(form)) => land::examine(&land(), form),
+            (Kind::Terrain(terrain), Some(form)) => terrain::examine(&terrain(), form),
             (Kind::Flight(flight), Some(form)) => flight::examine(&flight(), form),
             (Kind::Each(examine), Some(form)) => examine(form),
             (Kind::Alone(_, examine), _) => examine(),
@@ -185,7 +185,7 @@ pub fn trials(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<Tria
     let mut trials = Vec::new();
     for &case in cases {
         let forms = match case.kind {
-            Kind::Land(_) | Kind::Each(_) => forms::plain(techniques)?,
+            Kind::Terrain(_) | Kind::Each(_) => forms::plain(techniques)?,
             Kind::Flight(_) => forms::every_word(techniques)?,
             Kind::Alone(..) => Vec::new(),
         };
@@ -206,7 +206,12 @@ pub struct Found {
 }
 
 /// Runs trials on all cores, and then those with pictures on a device, if there is one, until `stop` is set.
-pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, stop: &AtomicBool, progress: impl Fn(&Trial) + Sync) -> Found {
+pub fn run(
+    trials: &[Trial],
+    eye: Option<&mut dyn ImageChecker>,
+    stop: &AtomicBool,
+    progress: impl Fn(&Trial) + Sync,
+) -> Found {
     let run = |trial: &Trial| {
         (!stop.load(Relaxed)).then(|| {
             progress(trial);
@@ -227,7 +232,7 @@ pub fn run(trials: &[Trial], eye: Option<&mut dyn Eye>, stop: &AtomicBool, progr
 fn draw(
     trials: &[Trial],
     findings: &mut [Vec<Finding>],
-    eye: &mut dyn Eye,
+    eye: &mut dyn ImageChecker,
     stop: &AtomicBool,
     progress: &impl Fn(&Trial),
 ) -> Option<String> {

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::fields::{hills, hills_at, seen};
 use super::forms::Form;
-use super::land::all_numbers;
-use super::laws::Broken;
-use super::{Case, Finding, Kind, Land, jitter};
+use super::invariants::Violation;
+use super::terrain::all_numbers;
+use super::{Case, Finding, Kind, StressTerrain, jitter};
 use crate::bench::paths;
 use crate::draw::DrawList;
 use crate::view::{Metric, Tolerance};
@@ -17,9 +17,9 @@ const fn case(name: &'static str, kind: Kind) -> Case {
 
 /// The family `position`.
 pub const CASES: &[Case] = &[
-    case("origin at 1e5 m", Kind::Land(|| at(1e5))),
-    case("origin at 1e7 m", Kind::Land(|| at(1e7))),
-    case("origin at the Earth's radius and a millimetre", Kind::Land(|| at(jitter::EARTH_M))),
+    case("origin at 1e5 m", Kind::Terrain(|| at(1e5))),
+    case("origin at 1e7 m", Kind::Terrain(|| at(1e7))),
+    case("origin at the Earth's radius and a millimetre", Kind::Terrain(|| at(jitter::EARTH_M))),
     case("500 000 x 500 000 samples", Kind::Each(half_a_million)),
     case("jitter at 0 m", Kind::Alone("vertex-program", || jitter::findings(0.0))),
     case("jitter at 1e5 m", Kind::Alone("vertex-program", || jitter::findings(1e5))),
@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     case("jitter at the Earth's radius", Kind::Alone("vertex-program", || jitter::findings(jitter::EARTH_M))),
 ];
 
-fn at(origin_m: f64) -> Land {
+fn at(origin_m: f64) -> StressTerrain {
     seen(hills_at(origin_m))
 }
 
@@ -40,7 +40,7 @@ fn half_a_million(form: &Form) -> Vec<Finding> {
     let field = Arc::new(hills([512, 512], [5.0; 2], 300.0).tiled([977, 977]));
     let mut technique = match form.entry.prepare(&field, &form.settings) {
         Ok(technique) => technique,
-        Err(why) => return vec![Finding::told("refused, saying why", 1.0).because(Some(why))],
+        Err(why) => return vec![Finding::reported("refused, saying why", 1.0).because(Some(why))],
     };
     let tolerance = Tolerance { px: 16.0, metric: Metric::Certified };
     let views = paths::find("corner").expect("a named path").views(&field, FRAMES, [160, 90], tolerance);
@@ -51,10 +51,10 @@ fn half_a_million(form: &Form) -> Vec<Finding> {
         let named = ("corner", *view);
         let (size, limits) = (list.size(), technique.limits());
         if !limits.hold(&size) {
-            fits = fits.and(Err(Broken::new(named, format!("{size:?} exceeds {limits:?}"))));
+            fits = fits.and(Err(Violation::new(named, format!("{size:?} exceeds {limits:?}"))));
         }
         let fine = all_numbers(&field, technique.as_ref(), view, &list);
-        numbers = numbers.and(fine.map_err(|why| Broken::new(named, why)));
+        numbers = numbers.and(fine.map_err(|why| Violation::new(named, why)));
     }
     vec![
         Finding::holds("lists fit the limits", fits),

@@ -1,4 +1,4 @@
-//! What the battery found, as rows: `stress.json`, and what the page is drawn from.
+//! What the suite found, as rows: `stress.json`, and what the page is drawn from.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Version of `stress.json`.
 pub const SCHEMA: u32 = 1;
 
-/// Name of the file in a battery's directory.
+/// Name of the file in a suite's directory.
 pub const FILE: &str = "stress.json";
 
 /// One check of one case with one technique.
@@ -38,7 +38,7 @@ pub struct Row {
     pub saved: Vec<String>,
 }
 
-/// A run of the battery.
+/// A run of the suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stress {
     /// [`SCHEMA`].
@@ -67,7 +67,7 @@ pub struct Picture {
 }
 
 impl Stress {
-    /// Reads a battery's directory.
+    /// Reads a suite's directory.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
         let text = std::fs::read(&path).with_context(|| path.display().to_string())?;

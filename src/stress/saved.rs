@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 use image::ImageFormat;
 
 use super::forms::Form;
-use super::laws::Broken;
-use super::{Eye, Finding, Kind, Trial};
+use super::invariants::Violation;
+use super::{Finding, ImageChecker, Kind, Trial};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
 use crate::height::Field;
@@ -37,24 +37,25 @@ pub fn counter_example(
     folder: &Path,
     trial: &Trial,
     finding: &Finding,
-    eye: Option<&mut dyn Eye>,
+    eye: Option<&mut dyn ImageChecker>,
 ) -> Result<Vec<PathBuf>> {
-    let (Some(form), Some(broken)) = (&trial.form, &finding.broken) else { return Ok(Vec::new()) };
+    let (Some(form), Some(violation)) = (&trial.form, &finding.violation) else { return Ok(Vec::new()) };
     let field = match &trial.case.kind {
-        Kind::Land(land) => land().field,
+        Kind::Terrain(terrain) => terrain().field,
         Kind::Flight(flight) => flight().field,
         Kind::Each(_) | Kind::Alone(..) => return Ok(Vec::new()),
     };
-    let name = file_name(&[trial.case.family, trial.case.name, &form.name, finding.check, broken.view.0]);
+    let name = file_name(&[trial.case.family, trial.case.name, &form.name, finding.check, violation.view.0]);
     let file = |extension: &str| folder.join(format!("{name}.{extension}"));
-    let (land, text, mesh, picture) = (file("tif"), file("txt"), file("ply"), file("png"));
-    save(&field, &land)?;
-    let (mesh_of, bits) = mesh_of(&field, form, &broken.view.1);
+    let (terrain, text, mesh, picture) = (file("tif"), file("txt"), file("ply"), file("png"));
+    save(&field, &terrain)?;
+    let (mesh_of, bits) = mesh_of(&field, form, &violation.view.1);
     let written = |path: &Path| path.display().to_string();
     replace(&mesh, |out| write_ply(&field, &mesh_of, bits, out)).with_context(|| written(&mesh))?;
-    replace(&text, |out| writeln!(out, "{}", describe(&land, form, broken, trial))).with_context(|| written(&text))?;
-    let mut files = vec![land, text, mesh];
-    if let Some(drawn) = eye.and_then(|eye| eye.picture(&field, form, &broken.view.1)) {
+    replace(&text, |out| writeln!(out, "{}", describe(&terrain, form, violation, trial)))
+        .with_context(|| written(&text))?;
+    let mut files = vec![terrain, text, mesh];
+    if let Some(drawn) = eye.and_then(|eye| eye.picture(&field, form, &violation.view.1)) {
         replace(&picture, |out| drawn.write_to(out, ImageFormat::Png).map_err(io::Error::other))
             .with_context(|| written(&picture))?;
         files.push(picture);
@@ -76,12 +77,12 @@ fn mesh_of(field: &Arc<Field>, form: &Form, view: &View) -> (Vec<Triangle>, u32)
 }
 
 /// What failed, and the commands that show it.
-fn describe(land: &Path, form: &Form, broken: &Broken, trial: &Trial) -> String {
-    let view = &broken.view.1;
-    let land = land.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+fn describe(terrain: &Path, form: &Form, violation: &Violation, trial: &Trial) -> String {
+    let view = &violation.view.1;
+    let terrain = terrain.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
     let metric = if view.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
     format!(
-        "{broken}\n\n{}\ncuesta render {land} {} --tolerance {} --metric {metric} {} --measure -o again.png",
+        "{violation}\n\n{}\ncuesta render {terrain} {} --tolerance {} --metric {metric} {} --measure -o again.png",
         command(trial),
         form.arguments(),
         view.tolerance.px,

@@ -10,10 +10,10 @@ use image::{ImageFormat, Rgb, RgbImage};
 use rayon::prelude::*;
 
 use super::forms::Form;
-use super::plants::{
-    COST, EVENT, FixedStep, Frame, Load, Proportional, Regulator, constant, overshoot, power, settling, step,
-};
 use super::rows::Picture;
+use super::simulated_loads::{
+    COST, EVENT, FixedStep, Load, Proportional, Regulator, SimulatedFrame, constant, overshoot, power, settling, step,
+};
 use super::{Case, Finding, Kind};
 use crate::bench::paths;
 use crate::draw::DrawList;
@@ -53,7 +53,7 @@ fn target(noise: f64) -> Target {
 }
 
 /// The overshoot of frames after the load's change could be known.
-fn overshoot_after(frames: &[Frame], delay: usize) -> f64 {
+fn overshoot_after(frames: &[SimulatedFrame], delay: usize) -> f64 {
     overshoot(&frames[EVENT + delay + 1..])
 }
 
@@ -82,8 +82,8 @@ fn judged(slopes: &[f64], factors: &[f64], noise: f64) -> Vec<Finding> {
         Finding::within("settled after, frames", settling, SETTLING),
     ];
     if seeds > 1 {
-        findings.push(Finding::told("overshoot, 95 % of the seeds", overshoot_95));
-        findings.push(Finding::told("settled after, 95 % of the seeds", settling_95));
+        findings.push(Finding::reported("overshoot, 95 % of the seeds", overshoot_95));
+        findings.push(Finding::reported("settled after, 95 % of the seeds", settling_95));
     }
     findings
 }
@@ -106,7 +106,7 @@ fn unknown_slopes() -> Vec<Finding> {
     vec![
         Finding::within("settled after, costs a frame late", found(1), SETTLING),
         Finding::within("settled after, costs 2 frames late", found(2), SETTLING),
-        Finding::told("settled after, costs 3 frames late", found(3)),
+        Finding::reported("settled after, costs 3 frames late", found(3)),
     ]
 }
 
@@ -176,7 +176,7 @@ fn saturation() -> Vec<Finding> {
 /// Random slopes, starts, steps, delays and noise: the shares that overshoot or settle late, and those of the two simpler
 /// regulators.
 fn many() -> Vec<Finding> {
-    const PLANTS: u64 = 1000;
+    const LOADS: u64 = 1000;
     let share = |make: &(dyn Fn(Target, f64) -> Box<dyn Regulator> + Sync)| {
         let of_plant = |seed: u64| {
             let random = |k: u64| f64::from(synth::noise::hash(seed as i64, k as i64, 11)) / f64::from(u32::MAX);
@@ -190,8 +190,8 @@ fn many() -> Vec<Finding> {
             [overshoot_after(&frames, delay) <= OVERSHOOT, settled <= SETTLING].map(u64::from)
         };
         let [held, settled] =
-            (0..PLANTS).into_par_iter().map(of_plant).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        [held, settled].map(|n| 1.0 - n as f64 / PLANTS as f64)
+            (0..LOADS).into_par_iter().map(of_plant).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        [held, settled].map(|n| 1.0 - n as f64 / LOADS as f64)
     };
     let controller = share(&|target, px| Box::new(Controller::new(target, px, RANGE_PX)));
     let fixed = share(&|target, px| Box::new(FixedStep::new(target, px)));
@@ -199,10 +199,10 @@ fn many() -> Vec<Finding> {
     vec![
         Finding::within("share that overshoots", controller[0], 0.05),
         Finding::within("share that settles late", controller[1], 0.2),
-        Finding::told("share that overshoots, fixed step", fixed[0]),
-        Finding::told("share that settles late, fixed step", fixed[1]),
-        Finding::told("share that overshoots, pure proportion", proportional[0]),
-        Finding::told("share that settles late, pure proportion", proportional[1]),
+        Finding::reported("share that overshoots, fixed step", fixed[0]),
+        Finding::reported("share that settles late, fixed step", fixed[1]),
+        Finding::reported("share that overshoots, pure proportion", proportional[0]),
+        Finding::reported("share that settles late, pure proportion", proportional[1]),
     ]
 }
 
@@ -221,8 +221,8 @@ fn real(form: &Form) -> Vec<Finding> {
         (synth::Kind::Peers, "noise: frames within 5 %", "noise: overshoot"),
     ];
     let of_field = |(kind, within, overshoot): (synth::Kind, &'static str, &'static str)| {
-        let Some([share, most]) = held(form, Arc::new(synth::synth(kind, [513, 513], 3))) else { return Vec::new() };
-        vec![Finding::told(within, share), Finding::told(overshoot, most)]
+        let Some([share, max]) = held(form, Arc::new(synth::synth(kind, [513, 513], 3))) else { return Vec::new() };
+        vec![Finding::reported(within, share), Finding::reported(overshoot, max)]
     };
     fields.into_par_iter().flat_map_iter(of_field).collect()
 }
@@ -252,7 +252,7 @@ fn held(form: &Form, field: Arc<Field>) -> Option<[f64; 2]> {
     }
     let settled = &costs[SETTLING as usize..];
     let within = settled.iter().filter(|cost| (**cost - 1.0).abs() <= 0.05).count();
-    let overshoot = settled.iter().fold(0.0, |most, cost| f64::max(most, cost - 1.0));
+    let overshoot = settled.iter().fold(0.0, |max, cost| f64::max(max, cost - 1.0));
     Some([within as f64 / settled.len() as f64, overshoot])
 }
 

@@ -31,7 +31,7 @@ pub const CASES: &[Case] = &[
 /// Frames of a flight.
 const FRAMES: usize = 24;
 
-fn land() -> Field {
+fn terrain() -> Field {
     hills([129, 97], [10.0; 2], 400.0)
 }
 
@@ -42,7 +42,7 @@ fn path(field: &Field, name: &str, frames: usize) -> Vec<View> {
 
 /// A named path with times of its own, seconds by frame.
 fn flown(name: &str, time_s: fn(usize) -> f64) -> Flight {
-    let field = Arc::new(land());
+    let field = Arc::new(terrain());
     let views = path(&field, name, FRAMES);
     let views = views.into_iter().enumerate().map(|(frame, view)| View { time_s: time_s(frame), ..view }).collect();
     Flight { views, field }
@@ -50,7 +50,7 @@ fn flown(name: &str, time_s: fn(usize) -> f64) -> Flight {
 
 /// A few steps of a fine flight forth, and the same back, again and again.
 fn there_and_back() -> Flight {
-    let field = Arc::new(land());
+    let field = Arc::new(terrain());
     let fine = path(&field, "circle", 40 * FRAMES);
     let frame = |k: usize| View {
         time_s: TIME_STEP_S * k as f64,
@@ -64,13 +64,13 @@ const CROSSINGS: usize = 12;
 
 /// A viewer who swings across a threshold: the mesh changes once a crossing at most, and with a slow clock not even that.
 fn oscillation(form: &Form) -> Vec<Finding> {
-    let field = Arc::new(land());
+    let field = Arc::new(terrain());
     let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
     let all = views::views(&field);
     let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
     let (near, far) = (of("from above a corner"), of("far outside"));
     let Some([before, behind]) = views::threshold(&field, &mut *technique, near, far.eye) else {
-        return vec![Finding::told("every list is the same", 1.0)];
+        return vec![Finding::reported("every list is the same", 1.0)];
     };
     // A hair to both sides, a frame each.
     let hair = (behind.eye - near.eye) * 1e-9;

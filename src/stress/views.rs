@@ -6,14 +6,14 @@ use glam::{DMat3, DVec3};
 
 use super::fields::hills;
 use super::forms::Form;
-use super::laws::{LAWS, Subject, TOLERANCES_PX};
-use super::{Case, Finding, Kind, Land};
+use super::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use super::{Case, Finding, Kind, StressTerrain};
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::view::{Aabb, Containment, Lens, Metric, Tolerance, View};
 
-const fn case(name: &'static str, land: fn() -> Land) -> Case {
-    Case { family: "view", name, kind: Kind::Land(land) }
+const fn case(name: &'static str, terrain: fn() -> StressTerrain) -> Case {
+    Case { family: "view", name, kind: Kind::Terrain(terrain) }
 }
 
 /// The family `view`. Straight down, upside down, rolled, parallel, under the land and exactly on a vertex are views of
@@ -29,14 +29,14 @@ pub const CASES: &[Case] = &[
 ];
 
 /// The land of this family.
-fn land() -> Field {
+fn terrain() -> Field {
     hills([129, 97], [10.0; 2], 400.0)
 }
 
 /// Its common views, changed.
-fn extreme(change: fn(View) -> View) -> Land {
-    let field = Arc::new(land());
-    Land { views: views(&field).into_iter().map(|(name, view)| (name, change(view))).collect(), field }
+fn extreme(change: fn(View) -> View) -> StressTerrain {
+    let field = Arc::new(terrain());
+    StressTerrain { views: views(&field).into_iter().map(|(name, view)| (name, change(view))).collect(), field }
 }
 
 /// As wide; parallel rays stay.
@@ -50,13 +50,13 @@ fn wide(view: View, degrees: f64) -> View {
 /// The last eye from which one list is drawn and the first from which another is, next to each other as numbers are, on
 /// the way from above a corner to far away: every law on both sides.
 fn on_a_threshold(form: &Form) -> Vec<Finding> {
-    let field = Arc::new(land());
+    let field = Arc::new(terrain());
     let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
     let all = views(&field);
     let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
     let (near, far) = (of("from above a corner"), of("far outside"));
     let Some(sides) = threshold(&field, &mut *technique, near, far.eye) else {
-        return vec![Finding::told("every list is the same", 1.0)];
+        return vec![Finding::reported("every list is the same", 1.0)];
     };
     let views = [("just before", sides[0]), ("just behind", sides[1])];
     let mut subject = Subject {
@@ -66,8 +66,8 @@ fn on_a_threshold(form: &Form) -> Vec<Finding> {
         tolerances_px: &TOLERANCES_PX,
         time_s: 0.0,
     };
-    let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
-    laws.map(|law| Finding::holds(law.name, (law.check)(&mut subject))).collect()
+    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(form.entry.name));
+    invariants.map(|invariant| Finding::holds(invariant.name, (invariant.check)(&mut subject))).collect()
 }
 
 /// The view and its eye moved towards `end`, halved until nothing lies between two that draw differently many triangles;

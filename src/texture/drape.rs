@@ -33,7 +33,7 @@ pub struct Shares {
 impl Drape {
     /// A picture of all of a field, or of every tile of a tiled one.
     pub fn over(field: &Field) -> Self {
-        Self::of_part(field, [0, 0], if field.land().is_some() { field.size() } else { field.stored() })
+        Self::of_part(field, [0, 0], if field.procedural().is_some() { field.size() } else { field.stored() })
     }
 
     /// A picture of a raster of `whole` samples, of which the field is the part that begins at sample `at`.
@@ -51,7 +51,7 @@ impl Drape {
     /// Samples after which a field repeats.
     pub fn period_of(field: &Field) -> [Option<u32>; 2] {
         let (stored, size) = (field.stored(), field.size());
-        [0, 1].map(|k| (field.land().is_none() && size[k] > stored[k]).then_some(stored[k]))
+        [0, 1].map(|k| (field.procedural().is_none() && size[k] > stored[k]).then_some(stored[k]))
     }
 
     /// True if the picture goes on from its start where it ends.
@@ -60,9 +60,9 @@ impl Drape {
     }
 
     /// The same relative to a lattice position: no large number is rounded.
-    pub fn shares(&self, anchor: [i32; 2]) -> Shares {
+    pub fn shares(&self, render_origin: [i32; 2]) -> Shares {
         let axes = [0, 1].map(|k| {
-            let (at, first, length) = (f64::from(anchor[k]), self.first[k], self.length[k]);
+            let (at, first, length) = (f64::from(render_origin[k]), self.first[k], self.length[k]);
             match self.period[k].map(f64::from) {
                 None => [at - first, 0.0, 0.0],
                 // A tile of the picture itself begins at its side, any other at the field's first sample.
@@ -87,10 +87,10 @@ mod tests {
     }
 
     /// The shader's result, in single precision.
-    fn share(drape: &Drape, anchor: [i32; 2], from_anchor: [f32; 2]) -> [f32; 2] {
-        let Shares { first, scale, period, start } = drape.shares(anchor);
+    fn share(drape: &Drape, render_origin: [i32; 2], from_render_origin: [f32; 2]) -> [f32; 2] {
+        let Shares { first, scale, period, start } = drape.shares(render_origin);
         [0, 1].map(|k| {
-            let share = from_anchor[k] * scale[k] + first[k];
+            let share = from_render_origin[k] * scale[k] + first[k];
             start[k] + if period[k] > 0.0 { share - period[k] * (share / period[k]).floor() } else { share }
         })
     }

@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use super::noise::{open_nearest, open_values};
-use super::slots::Texel;
+use super::tile_cache::Texel;
 use super::wedges::root_side;
 use super::working_set::Node;
 use crate::height::{Field, bezier};
@@ -79,10 +79,10 @@ impl Ground {
     }
 
     fn place(&self, at: [f64; 2], step: f64) -> Place {
-        let (height_m, slopes) = match self.field.land() {
-            Some(land) => {
+        let (height_m, slopes) = match self.field.procedural() {
+            Some(terrain) => {
                 let at = at.map(|n| n * bezier::SPACING_M);
-                (land.height(at), land.slopes(at, 2.0 * step * bezier::SPACING_M))
+                (terrain.height(at), terrain.slopes(at, 2.0 * step * bezier::SPACING_M))
             }
             None => (self.height(at), self.slopes(at, step.max(1.0))),
         };

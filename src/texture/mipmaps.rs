@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::page_maps::{Picture, Texel, coded, linear};
+use super::overlay_pyramid::{Picture, Texel, coded, linear};
 
 /// The texels along an axis that one of the next level covers: the first, and by how much each.
 #[derive(Clone, Copy)]

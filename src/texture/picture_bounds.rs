@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::drape::Drape;
-use super::picture_maps::Cut;
+use super::virtual_overlay::VirtualTextureLayout;
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure};
 use crate::height::progress::Progress;
@@ -27,8 +27,8 @@ pub struct PictureBounds {
 
 impl PictureBounds {
     /// Measures the terrain under a picture that is cut into pages.
-    pub fn new(field: &Field, cut: &Cut, drape: Drape) -> Self {
-        let page = [0, 1].map(|k| drape.length[k] / cut.extent[k]);
+    pub fn new(field: &Field, layout: &VirtualTextureLayout, drape: Drape) -> Self {
+        let page = [0, 1].map(|k| drape.length[k] / layout.extent[k]);
         // About a page long: any part then touches few squares.
         let cells = (page[0].max(page[1]).clamp(8.0, 4096.0) as u32).next_power_of_two();
         let measure = Measure { cells, growth: 1.0, errors: false, morph: false };
@@ -38,7 +38,7 @@ impl PictureBounds {
             last: field.size().map(|n| n - 1),
             drape,
             page,
-            cells: cut.cells,
+            cells: layout.cells,
             heights: Bounds::new(field, measure, &Progress::default()),
             top: field.ceiling().map_or(f32::NEG_INFINITY, |ceiling| ceiling.range()[1]),
         }
@@ -61,8 +61,8 @@ impl PictureBounds {
         let boxes = boxes.filter_map(|tile| self.placed(samples, range, tile));
         let near = boxes.filter(|b| frustum.contains(b) != Containment::Outside).map(|b| b.distance(view.eye));
         let beyond = |k: usize| f64::from(self.drape.period[k].unwrap_or(0)) * self.spacing[k];
-        let further = [(more_x, beyond(0)), (more_z, beyond(1))].into_iter().filter(|(more, _)| *more);
-        let nearest = near.chain(further.map(|(_, m)| m)).reduce(f64::min)?;
+        let second_target = [(more_x, beyond(0)), (more_z, beyond(1))].into_iter().filter(|(more, _)| *more);
+        let nearest = near.chain(second_target.map(|(_, m)| m)).reduce(f64::min)?;
         Some(match view.lens {
             Lens::Perspective { .. } => nearest.max(view.near) / view.focal_px(),
             Lens::Orthographic { .. } => 1.0 / view.focal_px(),
@@ -89,7 +89,7 @@ impl PictureBounds {
         let first = [0, 1].map(|k| (if first[k] < 0.0 { first[k] + period(k) } else { first[k] }).max(0.0) as u32);
         let level = (0..self.heights.levels() - 1).find(|&l| self.heights.side(l) >= side[0].max(side[1]));
         let square = self.heights.covering(level.unwrap_or(self.heights.levels() - 1), first, side);
-        square.has_land().then(|| [square.range[0], square.range[1].max(self.top)])
+        square.has_terrain().then(|| [square.range[0], square.range[1].max(self.top)])
     }
 
     /// The tiles along an axis in which a part lies nearest to the eye, and whether there are further ones.
@@ -128,8 +128,8 @@ mod tests {
     }
 
     fn bounds(field: &Field, drape: Drape) -> PictureBounds {
-        let cut = Cut::new([2048, 1536], drape.repeats(), 1 << 28, 2048).unwrap();
-        PictureBounds::new(field, &cut, drape)
+        let layout = VirtualTextureLayout::new([2048, 1536], drape.repeats(), 1 << 28, 2048).unwrap();
+        PictureBounds::new(field, &layout, drape)
     }
 
     fn view(eye: DVec3, pitch: f64) -> View {

@@ -44,7 +44,7 @@ pub struct Cutter<'a> {
     /// Level of the whole map.
     map_level: i32,
     /// Level of the largest texture of a node, if wedges are bisected for that.
-    most: Option<i32>,
+    max: Option<i32>,
     /// What hides pieces, if they are left out where they are hidden.
     depths: Option<&'a Depths>,
 }
@@ -62,18 +62,18 @@ pub struct Piece {
 
 impl<'a> Cutter<'a> {
     /// For a view, so many texels a pixel along an axis and a map of 4^`map_level` texels; wedges are bisected until no
-    /// node needs a texture above level `most`.
-    pub fn new(view: &View, quality: f64, map_level: i32, most: i32) -> Self {
+    /// node needs a texture above level `max`.
+    pub fn new(view: &View, quality: f64, map_level: i32, max: i32) -> Self {
         let mut planes = view.planes();
         // What is cut lies in front of the near plane, whatever rounding does.
         planes[0].1 -= view.near * 1e-9;
         let density = quality * quality;
-        Self { view: *view, planes, bounds: Bounds::Screen, density, map_level, most: Some(most), depths: None }
+        Self { view: *view, planes, bounds: Bounds::Screen, density, map_level, max: Some(max), depths: None }
     }
 
     /// The same for whole wedges: cut by less, and not bisected.
     pub fn whole(self, bounds: Bounds) -> Self {
-        Self { bounds, most: None, ..self }
+        Self { bounds, max: None, ..self }
     }
 
     /// The same without what is hidden by the wedges that `depths` were covered with.
@@ -91,7 +91,7 @@ impl<'a> Cutter<'a> {
     pub fn cut(&self, level: u32, corners: [Corner; 3], visit: &mut impl FnMut(&Piece)) {
         let Some(piece) = self.piece(level, &corners) else { return };
         let alpha = level_by_exponent(piece.texels, level).min(self.map_level);
-        if self.most.is_none_or(|most| alpha - most <= (level / 2) as i32) {
+        if self.max.is_none_or(|max| alpha - max <= (level / 2) as i32) {
             return visit(&piece);
         }
         let [apex, left, right] = corners;

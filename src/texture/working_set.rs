@@ -63,7 +63,7 @@ pub enum Change {
     /// It faces away: it needs nothing.
     Culled,
     /// It needs what it did.
-    Kept,
+    DeviceGeometry,
     /// It was not there, and its level was worked out.
     Begun,
     /// It went on to other levels, one after the other.
@@ -147,7 +147,7 @@ impl WorkingSet {
             }
         } else if area <= high && high < f64::INFINITY {
             need.frame = self.frame;
-            return Change::Kept;
+            return Change::DeviceGeometry;
         }
         self.go_on(key, wedge, area)
     }
@@ -172,7 +172,7 @@ impl WorkingSet {
     fn step_to(&mut self, key: u64, wedge: &Wedge, alpha: i32, interval: [f64; 2]) -> Change {
         if let Some(need) = self.needs.get_mut(&key).filter(|need| need.alpha == alpha && need.interval == interval) {
             need.frame = self.frame;
-            return Change::Kept;
+            return Change::DeviceGeometry;
         }
         let was_there = self.leave(key);
         self.enter(key, wedge, alpha, interval);
@@ -197,14 +197,14 @@ impl WorkingSet {
     }
 
     fn choose(&self, wedge: &Wedge, alpha: i32) -> Node {
-        let first_up_to = |most: i32| wedge.node(((alpha - most).max(0) as u32).min(wedge.deepest()));
+        let first_up_to = |max: i32| wedge.node(((alpha - max).max(0) as u32).min(wedge.deepest()));
         match self.stop {
-            Stop::Largest(most) => first_up_to(most),
-            Stop::Ends(most) => wedge.node(if alpha <= most { 0 } else { wedge.deepest() }),
-            Stop::Generated(most) => {
+            Stop::Largest(max) => first_up_to(max),
+            Stop::Ends(max) => wedge.node(if alpha <= max { 0 } else { wedge.deepest() }),
+            Stop::Generated(max) => {
                 let is_there = |node: &Node| self.resolution(*node) >= Some(self.own_level(*node, alpha) as u32);
                 let around = (0..=wedge.deepest()).map(|level| wedge.node(level));
-                around.into_iter().find(is_there).unwrap_or_else(|| first_up_to(most))
+                around.into_iter().find(is_there).unwrap_or_else(|| first_up_to(max))
             }
         }
     }

@@ -14,8 +14,8 @@ use winit::window::{Window, WindowId};
 use super::bindings::{self, Action, Binding, Trigger};
 use super::camera::Motion;
 use super::hud::{self, Content};
+use super::renderer::{FrameRequest, FrameStats, Shown, WindowRenderer};
 use super::session::{Request, Session, free_path};
-use super::stage::{Figures, Shot, Shown, Stage};
 use super::times::Times;
 use super::{Setup, Summary};
 use crate::gpu::instance::Messages;
@@ -47,7 +47,7 @@ pub struct App<'a> {
 
 /// The window and what draws in it. The stage goes first.
 struct Open {
-    stage: Stage,
+    renderer: WindowRenderer,
     context: egui::Context,
     window: Arc<Window>,
     is_occluded: bool,
@@ -103,9 +103,9 @@ impl<'a> App<'a> {
         let instance = Instance::new(&swapchain::extensions(event_loop)?, self.setup.validate)?;
         self.messages = Arc::clone(&instance.messages);
         let shared: Arc<dyn swapchain::Window> = Arc::clone(&window) as _;
-        let stage = Stage::new(self.setup, &instance, shared)?;
-        self.device = stage.device().to_string();
-        self.open = Some(Open { stage, context: egui::Context::default(), window, is_occluded: false });
+        let renderer = WindowRenderer::new(self.setup, &instance, shared)?;
+        self.device = renderer.device().to_string();
+        self.open = Some(Open { renderer, context: egui::Context::default(), window, is_occluded: false });
         self.started = Instant::now();
         Ok(())
     }
@@ -114,7 +114,7 @@ impl<'a> App<'a> {
     fn frame(&mut self) -> Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let size = open.window.inner_size();
-        let fit = if open.is_occluded { None } else { open.stage.fit([size.width, size.height])? };
+        let fit = if open.is_occluded { None } else { open.renderer.fit([size.width, size.height])? };
         let Some(size) = fit else {
             self.last_frame = None;
             std::thread::sleep(REST);
@@ -123,14 +123,14 @@ impl<'a> App<'a> {
         let now = Instant::now();
         let dt = self.last_frame.replace(now).map(|last| (now - last).as_secs_f64());
         let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
-        self.session.advance(&motion, &open.stage.figures, dt.unwrap_or(0.0));
+        self.session.advance(&motion, &open.renderer.stats, dt.unwrap_or(0.0));
         let time_s = self.started.elapsed().as_secs_f64();
         let view = View { time_s, ..self.session.view(self.setup, size) };
         let Session { look, frozen, wants_copy, .. } = self.session;
         let scale = open.window.scale_factor() as f32;
-        let overlay = |figures: &Figures| {
+        let overlay = |stats: &FrameStats| {
             let content = Content {
-                rows: self.session.rows(figures),
+                rows: self.session.rows(stats),
                 help: self.session.helps.then_some(self.bindings.as_slice()),
                 // A screenshot does not tell of the one before.
                 note: self.session.note().filter(|_| !wants_copy),
@@ -138,8 +138,8 @@ impl<'a> App<'a> {
             hud::paint(&open.context, size, scale, &content)
         };
         let look = look.after(time_s);
-        let shot = Shot { view: &view, look: &look, frozen, wants_copy };
-        if let Some(shown) = open.stage.show(self.setup, &shot, overlay)? {
+        let request = FrameRequest { view: &view, look: &look, frozen, wants_copy };
+        if let Some(shown) = open.renderer.show(self.setup, &request, overlay)? {
             if let Some(dt) = dt {
                 self.times.add(dt * 1e3);
             }
@@ -170,7 +170,7 @@ impl<'a> App<'a> {
         match request {
             Request::Nothing => return Ok(()),
             Request::Quit => event_loop.exit(),
-            Request::Look => open.stage.set_look(self.setup, &self.session.look)?,
+            Request::Look => open.renderer.set_look(self.setup, &self.session.look)?,
             Request::Technique => self.prepare(before)?,
         }
         // What took long was no frame.
@@ -183,9 +183,9 @@ impl<'a> App<'a> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let (entry, settings) = &self.session.technique;
         open.window.set_title(&format!("cuesta: preparing {}", entry.name));
-        if let Err(error) = open.stage.set_technique(self.setup, &self.session.look, entry, settings) {
+        if let Err(error) = open.renderer.set_technique(self.setup, &self.session.look, entry, settings) {
             self.session.tell(format!("{}: {error:#}", entry.name));
-            open.stage.set_technique(self.setup, &self.session.look, before.0, &before.1)?;
+            open.renderer.set_technique(self.setup, &self.session.look, before.0, &before.1)?;
             self.session.technique = before;
         }
         open.window.set_title(&self.session.title(self.setup));

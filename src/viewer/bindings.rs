@@ -162,11 +162,11 @@ impl Binding {
     /// Its triggers in words.
     pub fn keys(&self) -> String {
         // The number pad and the right-hand twins do the same as their brothers.
-        let twin = |t: &&Trigger| {
+        let position_check = |t: &&Trigger| {
             let name = format!("{t:?}");
             name.contains("Numpad") || name.contains("Right)") && name.contains("Shift")
         };
-        let keys = self.triggers.iter().filter(|t| !twin(t)).map(Trigger::to_string);
+        let keys = self.triggers.iter().filter(|t| !position_check(t)).map(Trigger::to_string);
         keys.map(|key| key.replace("ShiftLeft", "Shift")).collect::<Vec<_>>().join("  ")
     }
 }

@@ -265,7 +265,7 @@ mod tests {
 
     /// Anything a broken clock, a stuck key or a mad mouse may send.
     #[test]
-    fn it_stays_finite_and_above_the_land() {
+    fn it_stays_finite_and_above_the_terrain() {
         let site = site();
         let strange = [0.0, 1.0, -1.0, 1e-300, 1e9, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
         for mode in 0..3 {
@@ -368,8 +368,8 @@ mod tests {
                 }
                 let moved = camera.eye.distance(before.eye) / site.diagonal();
                 // A person on a continent does not come far.
-                let least = if mode == 2 { 1e-9 } else { 1e-3 };
-                assert!(moved > least && moved < 10.0, "{scale} {size:?} {mode}: {moved} diagonals");
+                let min = if mode == 2 { 1e-9 } else { 1e-3 };
+                assert!(moved > min && moved < 10.0, "{scale} {size:?} {mode}: {moved} diagonals");
             }
         }
     }

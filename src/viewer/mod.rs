@@ -4,9 +4,9 @@ mod app;
 pub mod bindings;
 pub mod camera;
 pub mod hud;
+mod renderer;
 mod session;
 pub mod site;
-mod stage;
 pub mod times;
 
 use std::path::Path;

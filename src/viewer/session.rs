@@ -7,8 +7,8 @@ use super::Setup;
 use super::bindings::Action;
 use super::camera::{Camera, Motion};
 use super::hud::Row;
+use super::renderer::FrameStats;
 use super::site::Site;
-use super::stage::Figures;
 use super::times::Smoothed;
 use crate::lod::budget::{Controller, RANGE_PX, Target};
 use crate::lod::{Entry, Settings, TECHNIQUES};
@@ -133,27 +133,27 @@ impl Session {
     }
 
     /// Moves the camera, and takes the last frame's figures. After a break `dt` is 0: there was no frame.
-    pub fn advance(&mut self, motion: &Motion, figures: &Figures, dt: f64) {
+    pub fn advance(&mut self, motion: &Motion, stats: &FrameStats, dt: f64) {
         self.camera.advance(&self.site, motion, dt);
         if dt == 0.0 {
             return;
         }
         self.frame.add(dt * 1e3, dt);
-        self.select.add(figures.select_ms, dt);
-        self.gpu.add(figures.gpu_ms, dt);
+        self.select.add(stats.select_ms, dt);
+        self.gpu.add(stats.gpu_ms, dt);
         if !self.frozen {
-            self.hold(figures, dt);
+            self.hold(stats, dt);
         }
     }
 
     /// Moves the tolerance by what the last frame cost.
-    fn hold(&mut self, figures: &Figures, dt: f64) {
+    fn hold(&mut self, stats: &FrameStats, dt: f64) {
         let Some(budget) = &mut self.budget else { return };
         let cost = match budget.target() {
-            Target::Triangles(_) => figures.triangles as f64,
+            Target::Triangles(_) => stats.triangles as f64,
             Target::FrameMs(_) => dt * 1e3,
         };
-        budget.learn(figures.tolerance_px, cost);
+        budget.learn(stats.tolerance_px, cost);
         self.tolerance.px = budget.tolerance_px();
     }
 
@@ -193,7 +193,7 @@ impl Session {
     }
 
     /// The numbers over the picture.
-    pub fn rows(&self, figures: &Figures) -> Vec<Row> {
+    pub fn rows(&self, stats: &FrameStats) -> Vec<Row> {
         if !self.shows_numbers {
             return Vec::new();
         }
@@ -211,12 +211,17 @@ impl Session {
             row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
             row("select", format!("{:.2} ms", self.select.get())),
             row("gpu", format!("{:.1} ms", self.gpu.get())),
-            row("triangles", grouped(figures.triangles)),
-            row("draws", grouped(figures.draws as u64)),
+            row("triangles", grouped(stats.triangles)),
+            row("draws", grouped(stats.draws as u64)),
             row("technique", format!("{}{frozen}", self.technique_name())),
             row(
                 "tolerance",
-                format!("{:.2} px {metric}{}{}", self.tolerance.px, self.held(), widened(figures.widening)),
+                format!(
+                    "{:.2} px {metric}{}{}",
+                    self.tolerance.px,
+                    self.held(),
+                    select_within_limits(stats.tolerance_scale)
+                ),
             ),
             row("colours", format!("{}{wire}", colour_name(self.look.colour))),
             row(
@@ -226,13 +231,13 @@ impl Session {
             row("position", format!("{x:.digits$} {y:.digits$} {z:.digits$} m")),
             row("above ground", length_text(self.camera.above_ground(&self.site))),
         ];
-        rows.extend(figures.maps.map(|maps| row("texels", maps.to_string())));
+        rows.extend(stats.maps.map(|maps| row("texels", maps.to_string())));
         rows
     }
 }
 
 /// What is said of a tolerance that was not kept.
-fn widened(factor: f64) -> String {
+fn select_within_limits(factor: f64) -> String {
     if factor > 1.0 { format!(", times {factor:.2}: too much to draw") } else { String::new() }
 }
 

@@ -1,6 +1,7 @@
 //! The arrows: which module may use which, where the device may be named, and how long a file may be.
 
 mod paths;
+mod words;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +12,7 @@ const LONGEST: usize = 500;
 /// Every module at the top of the crate, and those it may use.
 const ARROWS: &[(&str, &[&str])] = &[
     ("view", &[]),
+    ("renamed", &[]),
     ("height", &[]),
     ("draw", &["view", "height"]),
     ("lod", &["view", "height", "draw", "texture"]),
@@ -30,13 +32,13 @@ const ARROWS: &[(&str, &[&str])] = &[
 
 const BELOW_REPORT: &[&str] = &[
     "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "scene", "bench", "profile", "stress",
-    "viewer",
+    "viewer", "renamed",
 ];
 
 /// The command line starts whatever there is, the report too.
 const EVERYTHING: &[&str] = &[
     "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "scene", "bench", "profile", "stress",
-    "viewer", "report",
+    "viewer", "report", "renamed",
 ];
 
 /// What is wrong with a file of `src`, each as `file:line: what`. `file` is relative to `src`.
@@ -84,7 +86,7 @@ fn forbidden(module: &[String], target: &[String]) -> Option<String> {
         let rooms = (module.get(1)?, target.get(1)?);
         let is_room = |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
         let meet = from == "lod" && rooms.0 != rooms.1 && is_room(rooms.0) && is_room(rooms.1);
-        return meet.then(|| format!("room {} uses room {}", rooms.0, rooms.1));
+        return meet.then(|| format!("technique {} uses technique {}", rooms.0, rooms.1));
     }
     let known = |name: &str| ARROWS.iter().find(|(module, _)| *module == name);
     match known(from) {
@@ -129,9 +131,17 @@ fn made_up_violations_are_found() {
         ("view.rs", "use crate::height::Field;", "view may not use height"),
         ("draw/expand.rs", "use crate::{view::View, lod::{self, Entry}};", "draw may not use lod"),
         ("lod/mod.rs", "fn f() { crate::gpu::draw() }", "lod may not use gpu"),
-        ("lod/geomipmap/mod.rs", "use super::brute_force;", "room geomipmap uses room brute_force"),
-        ("lod/geomipmap/mesh.rs", "use super::super::brute_force::ENTRY;", "room geomipmap uses room brute_force"),
-        ("lod/brute_force.rs", "use crate::lod::{Entry, geomipmap::blocks};", "room brute_force uses room geomipmap"),
+        ("lod/geomipmap/mod.rs", "use super::brute_force;", "technique geomipmap uses technique brute_force"),
+        (
+            "lod/geomipmap/mesh.rs",
+            "use super::super::brute_force::ENTRY;",
+            "technique geomipmap uses technique brute_force",
+        ),
+        (
+            "lod/brute_force.rs",
+            "use crate::lod::{Entry, geomipmap::blocks};",
+            "technique brute_force uses technique geomipmap",
+        ),
         ("measure/mod.rs", "pub use crate::lod::Technique;", "measure may not use lod"),
         ("gpu/frame.rs", "use super::super::lod;", "gpu may not use lod"),
         ("report/mod.rs", "use crate::gpu;", "report may not use gpu"),

@@ -1,7 +1,7 @@
 //! Cases with a goal: the driver and its rows.
 
 use cuesta::bench::Case;
-use cuesta::bench::held::{Goal, Held};
+use cuesta::bench::goal::{BudgetStats, Goal};
 use cuesta::bench::results::Results;
 
 use super::mock;
@@ -21,7 +21,7 @@ fn goals_are_held_and_rows_say_so() {
     let results = Results::read(folder.path()).unwrap();
     assert_eq!(results.cases.iter().map(|result| result.case.clone()).collect::<Vec<_>>(), cases);
     let [triangles, time, free] = [0, 1, 2].map(|k| &results.cases[k]);
-    let held = |k: usize| results.cases[k].time.as_ref().unwrap().held.expect("a case with a goal");
+    let held = |k: usize| results.cases[k].time.as_ref().unwrap().budget.expect("a case with a goal");
     for (result, held) in [(triangles, held(0)), (time, held(1))] {
         println!("{}: {held:?}", result.case);
         // A time is held within what its noise was until it is known better.
@@ -33,7 +33,7 @@ fn goals_are_held_and_rows_say_so() {
     }
     assert!((time.time.as_ref().unwrap().frame_ms.value / 25.0 - 1.0).abs() < 0.1);
     assert!((triangles.time.as_ref().unwrap().triangles / 2e4 - 1.0).abs() < 0.05);
-    assert!(free.time.as_ref().unwrap().held.is_none() && free.rounds[0].tolerances_px.is_empty());
+    assert!(free.time.as_ref().unwrap().budget.is_none() && free.rounds[0].tolerances_px.is_empty());
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn a_goal_out_of_reach_is_not_said_to_be_held() {
     let folder = tempfile::tempdir().unwrap();
     mock::run(folder.path(), fields.clone(), vec![case], 1);
     let results = Results::read(folder.path()).unwrap();
-    let Held { within, settled, settling_frames, .. } = results.cases[0].time.as_ref().unwrap().held.unwrap();
+    let BudgetStats { within, settled, settling_frames, .. } = results.cases[0].time.as_ref().unwrap().budget.unwrap();
     assert_eq!((within, settled, settling_frames), (0.0, 0.0, 20.0));
     let finest = *results.cases[0].rounds[0].tolerances_px.last().unwrap();
     assert!((finest * 64.0 - 1.0).abs() < 1e-9, "{finest} px");

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::held::Helm;
+use cuesta::bench::goal::ToleranceController;
 use cuesta::bench::rows::{
-    AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, Plan, Pop, Reference,
-    Summary, Waiting, Within, Worst,
+    AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, PendingFrames, Plan,
+    Pop, Reference, Summary, Within, Worst,
 };
-use cuesta::bench::run::{Ended, Frame, Laboratory, Run, Scene, Timed};
+use cuesta::bench::run::{BenchBackend, BenchScene, Ended, FrameSample, Run, Timed};
 use cuesta::bench::{Case, SCHEMA, Terrain};
 use cuesta::height::Field;
 use cuesta::height::synth::{Kind, synth};
@@ -26,7 +26,7 @@ pub struct Mock {
     pub calls: Vec<String>,
 }
 
-impl Laboratory for Mock {
+impl BenchBackend for Mock {
     fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)> {
         let device = Device { name: "Mock & Sons <1>".to_string(), driver: "formula 1.0".to_string(), is_cpu: true };
         let decision = |feature: &str, reason: &str, bytes| Decision {
@@ -42,41 +42,41 @@ impl Laboratory for Mock {
         Ok((device, fields.iter().map(plan).collect()))
     }
 
-    fn time(&mut self, scene: &Scene) -> Result<Timed> {
+    fn time(&mut self, scene: &BenchScene) -> Result<Timed> {
         let call = self.calls.len();
         self.calls.push(format!("time {}", scene.case));
-        let mut helm = Helm::new(scene.case);
+        let mut controller = ToleranceController::new(scene.case);
         let frame = |k: usize| {
-            let view = helm.view(&scene.views[k]);
+            let view = controller.view(&scene.views[k]);
             let triangles = triangles(scene.case, view.tolerance.px);
             // The warm-up is slow.
             let slow = if k < 3 { 10.0 } else { 1.0 + 0.05 * ((k * 7 + call * 13) % 10) as f64 / 10.0 };
             let gpu_ms = (8.0 + triangles / 4e3) * slow;
             let [select_ms, record_ms] = [0.2 + triangles / 4e5, 0.3];
             let frame_ms = gpu_ms + select_ms + record_ms + 0.4;
-            helm.learn(&view, triangles as u64, frame_ms);
-            Frame {
+            controller.learn(&view, triangles as u64, frame_ms);
+            FrameSample {
                 frame_ms,
                 select_ms,
                 record_ms,
                 gpu_ms: (!self.is_bare).then_some(gpu_ms),
                 upload_ms: (!self.is_bare).then_some(0.1),
-                floor_ms: (!self.is_bare).then_some(7.5),
+                shading_only_ms: (!self.is_bare).then_some(7.5),
                 triangles: triangles as u64,
                 vertices: (!self.is_bare).then_some(triangles as u64 * 2),
                 draws: 12,
                 commands: 1,
-                widening: 1.0,
-                waiting: 0,
+                tolerance_scale: 1.0,
+                pending: 0,
                 tolerance_px: view.tolerance.px,
             }
         };
         let device_bytes = BTreeMap::from([("heights".to_string(), 1 << 20), ("mesh".to_string(), 1 << 16)]);
-        let figures = BTreeMap::from([("blocks".to_string(), 12.0)]);
-        Ok(Timed { frames: (0..scene.views.len()).map(frame).collect(), device_bytes, figures })
+        let stats = BTreeMap::from([("blocks".to_string(), 12.0)]);
+        Ok(Timed { frames: (0..scene.views.len()).map(frame).collect(), device_bytes, stats })
     }
 
-    fn measure(&mut self, scene: &Scene) -> Result<Errors> {
+    fn measure(&mut self, scene: &BenchScene) -> Result<Errors> {
         self.calls.push(format!("measure {}", scene.case));
         assert!(scene.views.windows(2).all(|pair| pair[0].time_s < pair[1].time_s), "the scene's time goes on");
         let case = scene.case;
@@ -109,7 +109,7 @@ impl Laboratory for Mock {
         });
         errors.watertight = Some(true);
         (errors.hole_pixels, errors.skirt_pixels) = (Some(0), Some(0));
-        errors.waiting = Some(Waiting { frames: 2, kept: 1, pixels: 77, excess_px: max / 3.0 });
+        errors.pending = Some(PendingFrames { frames: 2, kept: 1, pixels: 77, excess_px: max / 3.0 });
         errors.economy = Some(Economy {
             pixels_per_triangle: (-2..=8).map(|k| bin(k, (1000 - 30 * (k - peak - 3).pow(2)).max(3) as u64)).collect(),
             hidden_share: 0.3,
@@ -147,7 +147,7 @@ fn triangles(case: &Case, tolerance_px: f64) -> f64 {
 }
 
 /// A gradient, and dots where it is wrong.
-fn worst(scene: &Scene, error_px: f64) -> Result<Worst> {
+fn worst(scene: &BenchScene, error_px: f64) -> Result<Worst> {
     let pictures = scene.folder.join("pictures");
     std::fs::create_dir_all(&pictures)?;
     let name = scene.case.to_string().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
@@ -160,8 +160,8 @@ fn worst(scene: &Scene, error_px: f64) -> Result<Worst> {
 }
 
 /// The header of every run with the mock.
-pub fn header(laboratory: &mut dyn Laboratory, fields: &[(Terrain, Arc<Field>)]) -> Header {
-    let (device, plans) = laboratory.describe(fields).expect("the mock knows itself");
+pub fn header(backend: &mut dyn BenchBackend, fields: &[(Terrain, Arc<Field>)]) -> Header {
+    let (device, plans) = backend.describe(fields).expect("the mock knows itself");
     Header {
         schema: SCHEMA,
         program: "0.0.0".to_string(),

@@ -8,7 +8,7 @@ use cuesta::bench::journal::ROWS;
 use cuesta::bench::results::{RESULTS, Results, TABLE};
 use cuesta::bench::rows::Row;
 use cuesta::bench::run::{Ended, Run};
-use cuesta::bench::{Laboratory, journal};
+use cuesta::bench::{BenchBackend, journal};
 use rayon::prelude::*;
 
 use super::mock::{self, Mock};
@@ -127,7 +127,7 @@ fn rows_of_another_run_are_refused_in_one_line() {
     let mut refused = |change: &dyn Fn(&mut cuesta::bench::Header), word: &str| {
         let mut header = same.clone();
         change(&mut header);
-        let error = format!("{:#}", run.run(&mut mock as &mut dyn Laboratory, header, &mut |_| {}).unwrap_err());
+        let error = format!("{:#}", run.run(&mut mock as &mut dyn BenchBackend, header, &mut |_| {}).unwrap_err());
         assert!(error.contains(word) && error.contains(ROWS) && error.lines().count() == 1, "{error}");
     };
     refused(&|h| h.arguments.push("--frames 7".to_string()), "arguments");

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use boon::{Compiler, SchemaIndex, Schemas};
 use cuesta::bench::Case;
-use cuesta::bench::held::Goal;
+use cuesta::bench::goal::Goal;
 use cuesta::bench::journal::ROWS;
 use cuesta::bench::results::{self, RESULTS, Results, TABLE};
 use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary};
+use cuesta::renamed;
 use serde_json::Value;
 
 use super::mock;
@@ -43,7 +44,9 @@ fn results_and_rows_are_as_documented() {
     let (schemas, [whole, row]) = schemas();
     let value: Value = serde_json::from_str(&text(folder.path(), RESULTS)).unwrap();
     schemas.validate(&value, whole).unwrap_or_else(|error| panic!("{error:#}"));
-    assert_eq!(serde_json::from_value::<Results>(value).unwrap(), results, "what is written is read");
+    let mut present = value;
+    renamed::drop_former_names(&mut present);
+    assert_eq!(serde_json::from_value::<Results>(present).unwrap(), results, "what is written is read");
     for line in text(folder.path(), ROWS).lines() {
         let value = serde_json::from_str(line).unwrap();
         schemas.validate(&value, row).unwrap_or_else(|error| panic!("{error:#}"));
@@ -67,7 +70,7 @@ fn what_is_not_as_documented_is_found() {
         |v| v["cases"][0]["rounds"][0]["frame_ms"]["p50"] = Value::Null,
         |v| v["cases"][0]["errors"]["unheard_of"] = 1.into(),
         |v| v["cases"][11]["case"]["goal"]["frame_ms"] = 1.into(),
-        |v| v["cases"][11]["rounds"][0]["held"]["settled"] = 1.5.into(),
+        |v| v["cases"][11]["rounds"][0]["budget"]["settled"] = 1.5.into(),
         |v| v["header"]["machine"].as_object_mut().unwrap().clear(),
     ];
     for (k, change) in changes.iter().enumerate() {

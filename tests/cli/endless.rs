@@ -3,7 +3,7 @@
 use super::{folder, json, refused};
 
 #[test]
-fn the_endless_land_is_described_and_exported() {
+fn the_endless_terrain_is_described_and_exported() {
     let folder = folder();
     let info = json(folder.path(), &["info", "endless"]);
     assert_eq!((&info["format"], &info["width"]), (&"endless".into(), &((1u64 << 29) + 1).into()));

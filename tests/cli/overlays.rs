@@ -40,7 +40,7 @@ fn the_demos_overlay_repeats_and_is_cropped_with_it() {
 }
 
 /// Land of 61 × 41 samples, 10 m apart, whose north-west sample lies at 500005, 4100395.
-fn land(folder: &Path) {
+fn terrain(folder: &Path) {
     let mut text = "ncols 61\nnrows 41\nxllcorner 500000\nyllcorner 4099990\ncellsize 10\n".to_string();
     (0..41).for_each(|j| {
         text += &format!("{}\n", (0..61).map(|i| format!("{} ", 100 + i % 2 + j % 3)).collect::<String>())
@@ -93,7 +93,7 @@ fn a_picture_lies_where_it_says() {
         return;
     }
     let folder = folder();
-    land(folder.path());
+    terrain(folder.path());
     let picture = quarters([20, 10]);
     picture.save(folder.path().join("world.png")).unwrap();
     std::fs::write(folder.path().join("world.pgw"), "10\n0\n0\n-10\n500205\n4100295\n").unwrap();
@@ -132,7 +132,7 @@ fn a_picture_lies_where_it_says() {
 #[test]
 fn a_picture_of_another_coordinate_system_is_refused() {
     let folder = folder();
-    land(folder.path());
+    terrain(folder.path());
     let render = ["render", "land.asc", "-o", "p.png", "--overlay", "other.tif"];
     geotiff(&folder.path().join("other.tif"), &quarters([4, 4]), 32633, [500_200.0, 4_100_300.0], 10.0);
     refused(folder.path(), &render, &["other.tif", "EPSG:32632", "EPSG:32633"]);
@@ -172,7 +172,7 @@ fn a_picture_of_14_000_texels_a_side_opens() {
 
 /// Millimetres, thousands of kilometres, and the smallest field: land is seen, and nothing is said.
 #[test]
-fn land_of_any_size_is_seen() {
+fn terrain_of_any_size_is_seen() {
     if !has_device() {
         return;
     }
@@ -183,11 +183,11 @@ fn land_of_any_size_is_seen() {
         for crop in ["0,0,1025,1025", "100,100,2,2", "100,100,65,33"] {
             for ortho in [false, true] {
                 let width = format!("{}", spacing.parse::<f64>().unwrap() * 3.0);
-                let land =
+                let terrain =
                     ["demo", "--spacing", spacing, "--height-scale", scale, "--crop", crop, "--colour", "height"];
                 let lens = if ortho { vec!["--ortho", &width] } else { Vec::new() };
                 let view = ["-o", "p.png", "--size", "96x64", "--tolerance", "4", "--validate", "--quiet"];
-                json(folder.path(), &[&["render"], &land[..], &view[..], &lens].concat());
+                json(folder.path(), &[&["render"], &terrain[..], &view[..], &lens].concat());
                 let seen = image::open(folder.path().join("p.png")).unwrap().into_rgba8();
                 let share = seen.pixels().filter(|p| !is_sky(p)).count() as f64 / (96.0 * 64.0);
                 assert!(

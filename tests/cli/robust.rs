@@ -212,9 +212,9 @@ fn an_interrupt_at_any_moment_leaves_whole_files_only() {
     assert!(stopped > 6, "{stopped} calls were stopped");
 }
 
-/// The battery says what it found until it was stopped, and that there would have been more.
+/// The suite says what it found until it was stopped, and that there would have been more.
 #[test]
-fn an_interrupted_battery_tells_what_it_found() {
+fn an_interrupted_suite_tells_what_it_found() {
     let folder = folder();
     let arguments = ["stress", "--family", "file", "--family", "data", "--no-device", "--out", "kept", "--json"];
     for wait in 1..40 {
@@ -234,7 +234,7 @@ fn an_interrupted_battery_tells_what_it_found() {
         );
         return;
     }
-    panic!("the battery was never stopped in time");
+    panic!("the suite was never stopped in time");
 }
 
 /// Found at random: a text that claims more than the file holds made the decoder talk on stderr.

@@ -91,13 +91,13 @@ fn no_command_runs_longer_than_its_bound_on_a_hard_field() {
     let commands = if has_device { COMMANDS } else { &COMMANDS[..WITHOUT_A_DEVICE] };
     let fields: Vec<_> = stress::cases()
         .filter(|case| case.family == "data")
-        .filter_map(|case| if let Kind::Land(land) = &case.kind { Some((case.name, land)) } else { None })
+        .filter_map(|case| if let Kind::Terrain(terrain) = &case.kind { Some((case.name, terrain)) } else { None })
         .collect();
     let failures: Vec<String> = (0..fields.len())
         .into_par_iter()
         .flat_map_iter(|k| {
-            let ((name, land), folder) = (fields[k], folder());
-            save(&land().field, &folder.path().join("field.tif")).expect("room for a field");
+            let ((name, terrain), folder) = (fields[k], folder());
+            save(&terrain().field, &folder.path().join("field.tif")).expect("room for a field");
             // Techniques take turns: each draws some of the fields.
             let technique = TECHNIQUES[k % TECHNIQUES.len()].name;
             let word = |word: &'static str| match word {

@@ -159,8 +159,8 @@ fn the_plan_says_what_is_left_out() {
     };
     assert!(names("kept").contains(&"overlay".to_string()));
     assert!(names("left_out").contains(&"fog".to_string()) && names("left_out").contains(&"hole mask".to_string()));
-    let figures = plan["figures"].as_array().unwrap();
-    let value = |name: &str| figures.iter().find(|f| f["name"] == name).and_then(|f| f["value"].as_f64()).unwrap();
+    let stats = plan["figures"].as_array().unwrap();
+    let value = |name: &str| stats.iter().find(|f| f["name"] == name).and_then(|f| f["value"].as_f64()).unwrap();
     assert!(value("index bytes, six classes") < value("index bytes, sixteen masks"));
 }
 
@@ -345,8 +345,8 @@ fn an_interrupt_keeps_rows_and_pictures() {
     let lines = || std::fs::read_to_string(at.join("b/rows.jsonl")).map_or(0, |text| text.lines().count());
     let mut stops = 0;
     for kept in [1, 3, 8, 14] {
-        let least = kept.max(lines());
-        let (output, was_running) = interrupted_when(at, &bench, || lines() > least);
+        let min = kept.max(lines());
+        let (output, was_running) = interrupted_when(at, &bench, || lines() > min);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         let is_stopped = said.contains("the same command goes on");
         assert_eq!(code(&output), i32::from(is_stopped), "{said}");

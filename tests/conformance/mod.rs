@@ -1,26 +1,26 @@
 //! The laws that every technique keeps in every form, on every field, from every view. No device is needed.
 //!
-//! [`broken`] holds each law against techniques that break it.
+//! [`violation`] holds each law against techniques that break it.
 
-mod broken;
 pub(crate) mod cases;
+mod mutants;
 mod sweep;
 
 use std::sync::Arc;
 
 use cuesta::lod::TECHNIQUES;
-use cuesta::stress::laws::{LAWS, Subject, TOLERANCES_PX};
+use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
 use cuesta::stress::views;
 use rayon::prelude::*;
 
 /// All laws at once, so that each technique is prepared once: a failure names the law, the technique with its
 /// settings, the field and the view.
 #[test]
-fn every_technique_keeps_every_law() {
+fn every_technique_keeps_every_invariant() {
     let fields = cases::fields();
     let forms: Vec<_> = TECHNIQUES.iter().flat_map(cases::forms).collect();
     let pairs: Vec<_> = fields.iter().flat_map(|field| forms.iter().map(move |form| (field, form))).collect();
-    let broken: Vec<String> = pairs
+    let violation: Vec<String> = pairs
         .par_iter()
         .flat_map_iter(|&((field_name, field), form)| {
             let views = views::views(field);
@@ -32,11 +32,19 @@ fn every_technique_keeps_every_law() {
                 tolerances_px: &TOLERANCES_PX,
                 time_s: 0.0,
             };
-            let laws = LAWS.iter().filter(|law| law.is_for(form.entry.name));
-            let failed = laws.filter_map(move |law| Some((law.name, (law.check)(&mut subject).err()?)));
-            failed.map(|(law, why)| format!("{law}: {} on {field_name}: {why}", form.name)).collect::<Vec<_>>()
+            let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(form.entry.name));
+            let failed =
+                invariants.filter_map(move |invariant| Some((invariant.name, (invariant.check)(&mut subject).err()?)));
+            failed
+                .map(|(invariant, why)| format!("{invariant}: {} on {field_name}: {why}", form.name))
+                .collect::<Vec<_>>()
         })
         .collect();
-    assert!(broken.is_empty(), "{} failures, the first:\n{}", broken.len(), broken[..broken.len().min(12)].join("\n"));
-    println!("{} forms × {} fields × {} laws", forms.len(), fields.len(), LAWS.len());
+    assert!(
+        violation.is_empty(),
+        "{} failures, the first:\n{}",
+        violation.len(),
+        violation[..violation.len().min(12)].join("\n")
+    );
+    println!("{} forms × {} fields × {} invariants", forms.len(), fields.len(), INVARIANTS.len());
 }

@@ -10,10 +10,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cuesta::cli::whole::Whole;
-use cuesta::draw::{DrawList, Geometry, Limits, Manner};
+use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::height::{self, Field, Options, synth};
 use cuesta::lod::{self, Entry, Settings, Technique, geomipmap};
-use cuesta::stress::laws::{LAWS, Subject};
+use cuesta::stress::invariants::{INVARIANTS, Subject};
 use cuesta::stress::sweep::{self, SweepCase, random, shrink};
 use cuesta::stress::views;
 use cuesta::view::{Lens, Metric, Tolerance, View};
@@ -29,7 +29,7 @@ fn set<T: FromStr>(key: &str) -> Option<T> {
 }
 
 #[test]
-fn random_cases_keep_every_law() {
+fn random_cases_keep_every_invariant() {
     if let Some(case) = set::<SweepCase>("SWEEP_CASE") {
         case.check().unwrap_or_else(|failure| panic!("{failure}"));
         return;
@@ -86,8 +86,9 @@ fn coarse_triangles_reach_the_edge_of_any_field() {
             };
             let views: Vec<_> = views.iter().flat_map(under).collect();
             let mut subject = Subject { field, technique: &mut *technique, views: &views, tolerances_px, time_s: 0.0 };
-            for law in LAWS.iter().filter(|law| OF_COVERAGE.contains(&law.name)) {
-                (law.check)(&mut subject).unwrap_or_else(|why| panic!("{}: {name}, {form:?}: {why}", law.name));
+            for invariant in INVARIANTS.iter().filter(|invariant| OF_COVERAGE.contains(&invariant.name)) {
+                (invariant.check)(&mut subject)
+                    .unwrap_or_else(|why| panic!("{}: {name}, {form:?}: {why}", invariant.name));
             }
         }
     });
@@ -136,14 +137,14 @@ fn what_the_sweep_once_found_holds() {
 /// The list that a flat field needs stays short, whatever its size.
 #[test]
 fn a_flat_field_of_any_size_takes_few_triangles() {
-    for (size, most) in [([226, 70], 15), ([921, 859], 139), ([129, 129], 2), ([20, 31], 2), ([1300, 2], 22)] {
+    for (size, max) in [([226, 70], 15), ([921, 859], 139), ([129, 129], 2), ([20, 31], 2), ([1300, 2], 22)] {
         let field = Arc::new(synth::synth(synth::Kind::Flat, size, 3));
         let entry = lod::find("sphere-tree").expect("a row of the table");
         let mut technique = (entry.build)(Arc::clone(&field), &Settings::defaults(entry));
         let mut list = DrawList::default();
         technique.select(&default_view(&field), &mut list);
         println!("{size:?}: {} triangles", list.triangles());
-        assert!(list.triangles() <= most, "{size:?}: {} triangles", list.triangles());
+        assert!(list.triangles() <= max, "{size:?}: {} triangles", list.triangles());
     }
 }
 
@@ -166,8 +167,8 @@ impl Technique for BlockLost {
     fn keeps_tolerance(&self) -> bool {
         true
     }
-    fn manner(&self) -> Manner {
-        self.0.manner()
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        self.0.pipeline_requirements()
     }
 }
 
@@ -185,6 +186,6 @@ fn what_is_broken_is_found_and_made_small() {
     let shrunk = shrink::shrink(*failures[0].clone(), |case| case.check_with(&BLOCK_LOST));
     let SweepCase { terrain, settings, .. } = &shrunk.case;
     assert_eq!((terrain.kind.as_str(), terrain.size), ("flat", [2, 2]), "{shrunk}");
-    assert!(settings.is_empty() && shrunk.law == "one surface", "{shrunk}");
+    assert!(settings.is_empty() && shrunk.invariant == "one surface", "{shrunk}");
     assert_eq!(shrunk.case.to_string().parse(), Ok(shrunk.case.clone()), "it is read as it was printed");
 }

@@ -16,7 +16,7 @@ use super::views::check_list;
 use super::{fuzz, mutate};
 
 /// Fields of more samples are only looked at from outside.
-const MOST_SAMPLES: u64 = 1 << 16;
+const MAX_SAMPLES: u64 = 1 << 16;
 
 /// What flags take, right and nearly so, beside [`mutate::WORDS`] and the words that they list themselves.
 const VALUES: [&str; 26] = [
@@ -49,7 +49,7 @@ const VALUES: [&str; 26] = [
 ];
 
 /// A small file to read.
-static LAND: LazyLock<(tempfile::TempDir, String)> = LazyLock::new(|| {
+static TERRAIN: LazyLock<(tempfile::TempDir, String)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("land.tif");
     save::save(&synth::synth(synth::Kind::Fractal, [33, 17], 2), &path).expect("a small file");
@@ -80,7 +80,7 @@ fn words(random: &mut Rng) -> Vec<String> {
     let mut words = vec![command.get_name().to_string()];
     let flags: Vec<_> = command.get_arguments().chain(root.get_arguments()).collect();
     let positions = flags.iter().filter(|flag| flag.is_positional()).count();
-    words.extend((0..positions).map(|_| if random.u8(..8) == 0 { value(random, flags[0]) } else { LAND.1.clone() }));
+    words.extend((0..positions).map(|_| if random.u8(..8) == 0 { value(random, flags[0]) } else { TERRAIN.1.clone() }));
     // What every call needs.
     words.extend(
         flags
@@ -106,7 +106,7 @@ fn words(random: &mut Rng) -> Vec<String> {
 }
 
 /// Holds that an error is one line.
-fn told<T>(result: anyhow::Result<T>) -> Option<T> {
+fn outcome_of<T>(result: anyhow::Result<T>) -> Option<T> {
     let error = match result {
         Ok(value) => return Some(value),
         Err(error) => format!("{error:#}"),
@@ -122,27 +122,29 @@ fn quiet() -> Common {
 /// Reads the field, and selects in the view if that is soon done.
 fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: Option<&LookArgs>) {
     let Some(loaded) =
-        told(ReadArgs { no_cache: true, ..reading.clone() }.load(&quiet(), std::slice::from_ref(&LAND.1)))
+        outcome_of(ReadArgs { no_cache: true, ..reading.clone() }.load(&quiet(), std::slice::from_ref(&TERRAIN.1)))
     else {
         return;
     };
-    look.map(|look| told(look.build(&quiet(), &LAND.1, (&loaded.field, &loaded.footprint))));
-    let Some((entry, settings)) = told(technique.settings()) else { return };
+    look.map(|look| outcome_of(look.build(&quiet(), &TERRAIN.1, (&loaded.field, &loaded.footprint))));
+    let Some((entry, settings)) = outcome_of(technique.settings()) else { return };
     let field: Arc<Field> = Arc::new(loaded.field);
-    let Some(view) = told(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else { return };
+    let Some(view) = outcome_of(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else {
+        return;
+    };
     let [w, h] = field.size().map(u64::from);
-    if w * h <= MOST_SAMPLES {
+    if w * h <= MAX_SAMPLES {
         let prepared = entry.prepare(&field, &settings).map_err(anyhow::Error::msg);
-        if let Some(mut technique) = told(prepared) {
+        if let Some(mut technique) = outcome_of(prepared) {
             check_list(&field, &view, technique.as_mut());
         }
     }
 }
 
 fn measured(args: &MeasureArgs) {
-    let is_small = args.terrain.iter().all(|file| *file == LAND.1) && args.reading.tile.is_none() && !args.kit;
+    let is_small = args.terrain.iter().all(|file| *file == TERRAIN.1) && args.reading.tile.is_none() && !args.kit;
     if is_small {
-        told(Planned::new(&quiet(), args));
+        outcome_of(Planned::new(&quiet(), args));
     }
 }
 
@@ -173,6 +175,6 @@ fn check(words: &[String]) {
 
 #[test]
 fn whatever_the_words_an_answer_or_one_line() {
-    assert!(Path::new(&LAND.1).is_file());
+    assert!(Path::new(&TERRAIN.1).is_file());
     fuzz("arguments", words, check);
 }

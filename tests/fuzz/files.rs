@@ -9,7 +9,7 @@ use crate::height::tiny;
 /// What ends the data and begins the header beside it.
 const HEADER: &[u8] = b"\xffH";
 /// The most samples that may be read.
-const MOST_SAMPLES: u64 = 1 << 16;
+const MAX_SAMPLES: u64 = 1 << 16;
 
 /// Two bytes of wishes, the file, and a header beside it.
 fn seeds() -> Vec<Vec<u8>> {
@@ -30,7 +30,7 @@ fn options(wishes: [u8; 2]) -> Options {
         spacing: has(4).then_some([1e-3, 1e5]),
         height_scale: has(5).then_some(1e30),
         tiles: has(6).then_some([3, 2]),
-        max_samples: MOST_SAMPLES,
+        max_samples: MAX_SAMPLES,
         ..Options::default()
     }
 }
@@ -44,7 +44,7 @@ fn check(input: &[u8]) {
     match load_bytes_with("fuzzed", bytes, &siblings, &options([*first, *second])) {
         Ok(loaded) => {
             let [w, h] = loaded.field.size();
-            assert!(loaded.field.samples().len() as u64 <= MOST_SAMPLES, "{w} x {h} samples");
+            assert!(loaded.field.samples().len() as u64 <= MAX_SAMPLES, "{w} x {h} samples");
             assert!((0..h).all(|j| (0..w).all(|i| loaded.field.height(i, j).is_finite())), "a height is no number");
         }
         Err(error) => {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cuesta::bench::held::Goal;
+use cuesta::bench::goal::Goal;
 use cuesta::bench::journal::{Journal, ROWS};
 use cuesta::bench::results::{self, Results};
 use cuesta::bench::{Case, compare};
@@ -115,7 +115,7 @@ fn whatever_the_rows_a_report_or_one_line() {
     fuzz("results", lines, check);
 }
 
-fn battery() -> String {
+fn suite() -> String {
     let row = |family: &str, value, limit| Row {
         family: family.to_string(),
         name: "a case".to_string(),
@@ -141,14 +141,14 @@ fn battery() -> String {
 }
 
 #[test]
-fn whatever_the_battery_a_page_or_one_line() {
-    let whole = battery();
+fn whatever_the_suite_a_page_or_one_line() {
+    let whole = suite();
     let check = |lines: &[String]| {
         let folder = tempfile::tempdir().expect("a folder");
         write(folder.path(), FILE, &lines.concat());
         let _ = report::write_stress(folder.path());
     };
-    fuzz("battery", |random| vec![changed(random, &whole)], check);
+    fuzz("suite", |random| vec![changed(random, &whole)], check);
 }
 
 /// Found at random: sums of what rows say went over.

@@ -30,17 +30,17 @@ pub struct Pose {
 
 /// Fields that differ in what is hard about them.
 pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
-    let land = |kind, size| synth::synth(kind, size, 3);
-    let mut spaced = land(synth::Kind::Fractal, [33, 17]);
+    let terrain = |kind, size| synth::synth(kind, size, 3);
+    let mut spaced = terrain(synth::Kind::Fractal, [33, 17]);
     spaced.spacing = [1e-3, 1e5];
-    let mut far = land(synth::Kind::Spike, [17, 21]);
+    let mut far = terrain(synth::Kind::Spike, [17, 21]);
     far.origin = [1e7, -6.4e6];
     let mut holes = Holes::none(25);
     (5..12).for_each(|k| holes.insert(k));
     let holed = Field::new(Samples::F32((0..25).map(|k| (k * k % 7) as f32).collect()), [5, 5], [1.0; 2], holes);
     let smallest = Field::new(Samples::F32(vec![0.0, 1e7, -1e7, 1e-30]), [2, 2], [3.0, 0.5], Holes::none(4));
-    let tiled = land(synth::Kind::Checker, [9, 7]).tiled([3, 5]);
-    [spaced, far, holed, smallest, tiled, land(synth::Kind::Cliff, [65, 65])].map(Arc::new).to_vec()
+    let tiled = terrain(synth::Kind::Checker, [9, 7]).tiled([3, 5]);
+    [spaced, far, holed, smallest, tiled, terrain(synth::Kind::Cliff, [65, 65])].map(Arc::new).to_vec()
 });
 
 static ENDLESS: LazyLock<Arc<Field>> = LazyLock::new(|| Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS)))));
@@ -124,8 +124,8 @@ impl Pose {
 pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::Technique) {
     let mut list = DrawList::default();
     technique.select(view, &mut list);
-    assert!(list.widening >= 1.0, "widening {}", list.widening);
-    if field.land().is_some() {
+    assert!(list.tolerance_scale >= 1.0, "scale {}", list.tolerance_scale);
+    if field.procedural().is_some() {
         return;
     }
     let [last_x, last_z] = field.size().map(|n| (i64::from(n) - 1) << list.fraction_bits);

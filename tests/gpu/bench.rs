@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use cuesta::bench::device::DeviceLaboratory;
+use cuesta::bench::device::DeviceBackend;
 use cuesta::bench::journal::Journal;
 use cuesta::bench::rows::{Case, ErrorRow, Header, Machine, Row, Terrain, TimeRow};
-use cuesta::bench::run::{Ended, Laboratory, Run};
+use cuesta::bench::run::{BenchBackend, Ended, Run};
 use cuesta::gpu::Gpu;
 use cuesta::height::Field;
 use cuesta::plan::Look;
@@ -32,8 +32,8 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
         every: 4,
     };
     let fields = vec![(terrain.clone(), Arc::clone(field))];
-    let mut laboratory = DeviceLaboratory::new(Arc::clone(gpu), Look::default());
-    let (device, plans) = laboratory.describe(&fields).unwrap();
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
+    let (device, plans) = backend.describe(&fields).unwrap();
     let header = Header {
         schema: cuesta::bench::SCHEMA,
         program: String::new(),
@@ -48,7 +48,7 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
     let stop = AtomicBool::new(false);
     let cases = TECHNIQUES.map(case).to_vec();
     let run = Run { folder, cases, fields, rounds: 2, warm_up: 2, stop: &stop };
-    assert_eq!(run.run(&mut laboratory, header.clone(), &mut |_| {}).unwrap(), Ended::Complete);
+    assert_eq!(run.run(&mut backend, header.clone(), &mut |_| {}).unwrap(), Ended::Complete);
     let journal = Journal::open(folder, header).unwrap();
     let (mut times, mut errors) = (Vec::new(), Vec::new());
     for row in journal.rows() {
@@ -69,7 +69,7 @@ fn rows_say_what_is_known() {
         assert_eq!((times.len(), errors.len()), (2 * TECHNIQUES.len(), TECHNIQUES.len()));
         for row in &times {
             let t = &row.times;
-            assert!(t.frame_ms.p50 > 0.0 && t.floor_ms.unwrap().p50 > 0.0 && t.triangles.mean > 0.0, "{row:?}");
+            assert!(t.frame_ms.p50 > 0.0 && t.shading_only_ms.unwrap().p50 > 0.0 && t.triangles.mean > 0.0, "{row:?}");
             assert!(t.frame_ms.p50 >= t.select_ms.p50, "{row:?}");
             assert!(t.device_bytes["heights"] > 0, "{row:?}");
         }

@@ -11,33 +11,42 @@ use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
 use cuesta::measure::geometric;
 use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::View;
 
-use super::neck::{Explicit, Way};
+use super::draw_list::{Explicit, Way};
 use super::{as_f32, aslant, difference, mountains, on_device, technique};
 
-fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Stage {
+fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
-    let mut stage = Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, view.size).unwrap();
-    stage.draw(technique, view, Copy::PictureAndDepth).unwrap();
-    stage
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
+        .unwrap()
+        .with_requirements(technique.pipeline_requirements());
+    let mut renderer =
+        Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, view.size).unwrap();
+    renderer.draw(technique, view, Copy::PictureAndDepth).unwrap();
+    renderer
 }
 
 fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn Technique) {
     let view = aslant(field, [160, 100], 2.0);
-    let mut stage = stage(gpu, field, technique, &view);
-    assert_same(&mut stage, technique, field, &view, name);
+    let mut renderer = renderer(gpu, field, technique, &view);
+    assert_same(&mut renderer, technique, field, &view, name);
 }
 
 /// What the device draws of the last list is what the list says.
-fn assert_same(stage: &mut Stage, technique: &mut dyn Technique, field: &Arc<Field>, view: &View, name: &str) {
-    let captured = stage.capture(technique, view).unwrap();
-    let frame = Frame { fraction_bits: stage.list.fraction_bits as i32, ..Frame::placing(field, view) };
-    let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &stage.list));
+fn assert_same(
+    renderer: &mut SceneRenderer,
+    technique: &mut dyn Technique,
+    field: &Arc<Field>,
+    view: &View,
+    name: &str,
+) {
+    let captured = renderer.capture(technique, view).unwrap();
+    let frame = Frame { fraction_bits: renderer.list.fraction_bits as i32, ..Frame::placing(field, view) };
+    let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &renderer.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
-    assert_eq!(expanded[1].is_empty(), technique.manner().seams == Seams::Shared, "{name}");
+    assert_eq!(expanded[1].is_empty(), technique.pipeline_requirements().seams == Seams::Shared, "{name}");
     let bits = |t: &expand::Drawn| (t.instance, t.corners.map(|c| (c.x, c.z, c.y.to_bits())));
     for (there, here) in captured.iter().flatten().zip(expanded.iter().flatten()) {
         assert_eq!(bits(&there.drawn), bits(here), "{name}: {there:?} {here:?}");
@@ -49,8 +58,8 @@ fn assert_same(stage: &mut Stage, technique: &mut dyn Technique, field: &Arc<Fie
 #[test]
 fn as_drawn_is_as_expanded_to_the_bit() {
     on_device(|gpu| {
-        let land = Arc::new(synth::synth(synth::Kind::Fractal, [513, 400], 9));
-        for field in [mountains(), as_f32(&mountains()), land] {
+        let terrain = Arc::new(synth::synth(synth::Kind::Fractal, [513, 400], 9));
+        for field in [mountains(), as_f32(&mountains()), terrain] {
             let rooms = [
                 ("brute-force", &[][..]),
                 ("geomipmap", &[]),
@@ -90,15 +99,15 @@ fn chunks_that_morph_and_are_rebuilt_are_as_expanded_in_every_frame() {
         let start = aslant(&field, [160, 100], 2.0);
         for settings in [["tile=9", "rebuild=3", "clock=frames"], ["tile=17", "rebuild=100000", "clock=speed"]] {
             let mut technique = technique(&field, "smooth-tiles", &settings);
-            let mut stage = stage(gpu, &field, technique.as_mut(), &start);
+            let mut renderer = renderer(gpu, &field, technique.as_mut(), &start);
             let mut rebuilt = 0;
             for k in 1..30 {
                 // Forwards, and back at twice the speed.
                 let along = f64::from(if k < 20 { k } else { 60 - 2 * k });
                 let view = View { eye: start.eye + start.forward() * 12.0 * along, ..start };
-                stage.draw(technique.as_mut(), &view, Copy::Nothing).unwrap();
-                rebuilt += usize::from(!stage.list.uploads.is_empty());
-                assert_same(&mut stage, technique.as_mut(), &field, &view, &format!("{settings:?}, frame {k}"));
+                renderer.draw(technique.as_mut(), &view, Copy::Nothing).unwrap();
+                rebuilt += usize::from(!renderer.list.uploads.is_empty());
+                assert_same(&mut renderer, technique.as_mut(), &field, &view, &format!("{settings:?}, frame {k}"));
             }
             assert!(rebuilt > 5, "{settings:?}: chunks came in {rebuilt} frames");
         }
@@ -109,18 +118,20 @@ fn chunks_that_morph_and_are_rebuilt_are_as_expanded_in_every_frame() {
 const ULPS: f64 = 64.0;
 
 #[test]
-fn the_devices_oracle_agrees_with_the_exact_one() {
+fn the_devices_error_pass_agrees_with_the_exact_one() {
     on_device(|gpu| {
-        let land = Arc::new(synth::synth(synth::Kind::Fractal, [700, 513], 3));
-        for (field, px) in [(mountains(), 1.0), (as_f32(&mountains()), 6.0), (Arc::clone(&land), 2.0), (land, 12.0)] {
+        let terrain = Arc::new(synth::synth(synth::Kind::Fractal, [700, 513], 3));
+        for (field, px) in
+            [(mountains(), 1.0), (as_f32(&mountains()), 6.0), (Arc::clone(&terrain), 2.0), (terrain, 12.0)]
+        {
             let view = aslant(&field, [640, 400], px);
             let rooms =
                 [("geomipmap", &["block=33"][..]), ("sorted-strips", &["level=uniform", "blend=end", "page=256"])];
             for (name, settings) in rooms {
                 let mut technique = technique(&field, name, settings);
-                let mut stage = stage(gpu, &field, technique.as_mut(), &view);
-                let there = stage.errors(technique.as_ref(), &view).unwrap();
-                let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
+                let mut renderer = renderer(gpu, &field, technique.as_mut(), &view);
+                let there = renderer.errors(technique.as_ref(), &view).unwrap();
+                let here = geometric::errors(&field, &view, technique.resident(), &renderer.list);
                 for (there, here) in there.into_iter().zip([here.vertical_m, here.screen_px]) {
                     let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
                     assert!(here.max > 0.0 && here.count > 5000, "{here:?}");
@@ -144,15 +155,15 @@ fn the_floor_shows_what_the_frame_showed() {
         for field in [mountains(), as_f32(&mountains())] {
             let view = aslant(&field, [320, 200], 0.5);
             let mut technique = technique(&field, "brute-force", &[]);
-            let mut stage = stage(gpu, &field, technique.as_mut(), &view);
-            let (drawn, depth) = (stage.picture(), stage.depth());
+            let mut renderer = renderer(gpu, &field, technique.as_mut(), &view);
+            let (drawn, depth) = (renderer.picture(), renderer.depth());
             let covered = |p: &image::Rgba<u8>| p.0[3] > 0;
             assert!(drawn.pixels().zip(&depth).all(|(p, &d)| covered(p) == (d > 0.0)), "land is where depth is");
-            let times = stage.draw_floor(&view, Copy::Picture).unwrap();
-            let floor = stage.picture();
+            let times = renderer.draw_shading_only(&view, Copy::Picture).unwrap();
+            let floor = renderer.picture();
             let (largest, share) = difference(&drawn, &floor, 6);
             assert!(share < 0.002, "{largest} at worst, {share} of the pixels differ");
-            assert_eq!(times.gpu.passes.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["floor"]);
+            assert_eq!(times.gpu.passes.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["shading only"]);
         }
     });
 }

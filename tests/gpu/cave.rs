@@ -13,7 +13,7 @@ use cuesta::lod::Technique;
 use cuesta::measure::geometric;
 use cuesta::plan::{Colour, Look, ScenePlan};
 use cuesta::scene::holes::Truth;
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::{difference, on_device, technique};
@@ -31,12 +31,12 @@ fn flight(field: &Field, frames: usize, px: f64) -> Vec<View> {
 }
 
 fn plan(gpu: &Gpu, field: &Field, look: &Look, technique: &dyn Technique) -> ScenePlan {
-    ScenePlan::new(field, look, &gpu.device_limits()).unwrap().with_manner(technique.manner())
+    ScenePlan::new(field, look, &gpu.device_limits()).unwrap().with_requirements(technique.pipeline_requirements())
 }
 
-fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Technique, view: &View) -> Stage {
+fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Technique, view: &View) -> SceneRenderer {
     let plan = plan(gpu, field, look, technique);
-    Scene { gpu, field, plan: &plan, look, overlay: None }.stage(technique, view.size).unwrap()
+    Scene { gpu, field, plan: &plan, look, overlay: None }.renderer(technique, view.size).unwrap()
 }
 
 /// The share of a picture's pixels of which that is true.
@@ -50,15 +50,15 @@ fn the_device_draws_the_floor_and_the_ceiling_that_the_host_expands() {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
         for view in flight(&field, 4, 1.5) {
-            let mut stage = stage(gpu, &field, &Look::default(), technique.as_ref(), &view);
-            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
-            let [captured, skirts] = stage.capture(technique.as_ref(), &view).unwrap();
+            let mut renderer = renderer(gpu, &field, &Look::default(), technique.as_ref(), &view);
+            renderer.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let [captured, skirts] = renderer.capture(technique.as_ref(), &view).unwrap();
             let captured: Vec<Drawn> = captured.iter().map(|t| t.drawn).collect();
             let frame = Frame::placing(&field, &view);
-            assert_eq!(captured, expand::triangles(&field, &frame, technique.resident(), &stage.list));
+            assert_eq!(captured, expand::triangles(&field, &frame, technique.resident(), &renderer.list));
             assert!(captured.len() > 500 && skirts.is_empty(), "{} triangles", captured.len());
-            let [there_m, there_px] = stage.errors(technique.as_ref(), &view).unwrap();
-            let here = geometric::errors(&field, &view, technique.resident(), &stage.list);
+            let [there_m, there_px] = renderer.errors(technique.as_ref(), &view).unwrap();
+            let here = geometric::errors(&field, &view, technique.resident(), &renderer.list);
             for (there, here) in [(there_m, here.vertical_m), (there_px, here.screen_px)] {
                 let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
                 assert!(here.count > 1000 && near(there.count as f64, here.count as f64, 2e-3), "{there:?} {here:?}");
@@ -77,14 +77,14 @@ fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
         let plan = plan(gpu, &field, &look, technique.as_ref());
         let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
         for (k, view) in flight(&field, 8, 1.0).iter().enumerate() {
-            let shot = scene.shoot(technique.as_mut(), view, 1).unwrap();
+            let rendered = scene.render(technique.as_mut(), view, 1).unwrap();
             let truth = Truth::new(&scene, view).unwrap();
-            assert_eq!(truth.hole_pixels(&scene, view, &shot.picture).unwrap(), [0; 0], "frame {k}");
+            assert_eq!(truth.hole_pixels(&scene, view, &rendered.picture).unwrap(), [0; 0], "frame {k}");
             // The way ends at the field's rim, where the cave is open.
-            let closed = share(&shot.picture, |[_, _, _, a]| a > 0);
+            let closed = share(&rendered.picture, |[_, _, _, a]| a > 0);
             println!("frame {k}: {closed:.3} of the pixels are rock; eye {:?}, forward {:?}", view.eye, view.forward());
             assert!(closed > if (2..6).contains(&k) { 0.9 } else { 0.3 }, "frame {k}: {closed} of the pixels are rock");
-            let (_, apart) = difference(&shot.picture, &truth.picture, 24);
+            let (_, apart) = difference(&rendered.picture, &truth.picture, 24);
             assert!(apart < 0.05, "frame {k}: {apart} of the pixels are not those of all samples");
         }
     });
@@ -103,9 +103,9 @@ fn faces_are_lit_as_what_they_are() {
                 let view = View { world_from_eye: View::turned(0.0, pitch, 0.0), lens, ..*view };
                 let mut picture = |colour| {
                     let look = Look { colour, ..Look::default() };
-                    let mut stage = stage(gpu, &field, &look, technique.as_ref(), &view);
-                    stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
-                    stage.picture()
+                    let mut renderer = renderer(gpu, &field, &look, technique.as_ref(), &view);
+                    renderer.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+                    renderer.picture()
                 };
                 // A normal's y from −1 to 1 is half of the light or less, or more.
                 let normals = picture(Colour::Normal);
@@ -125,11 +125,11 @@ fn the_floor_of_the_time_is_lit_alike() {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
         for view in flight(&field, 3, 0.5) {
-            let mut stage = stage(gpu, &field, &Look::default(), technique.as_ref(), &view);
-            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
-            let drawn = stage.picture();
-            stage.draw_floor(&view, Copy::Picture).unwrap();
-            let (largest, share) = difference(&drawn, &stage.picture(), 6);
+            let mut renderer = renderer(gpu, &field, &Look::default(), technique.as_ref(), &view);
+            renderer.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let drawn = renderer.picture();
+            renderer.draw_shading_only(&view, Copy::Picture).unwrap();
+            let (largest, share) = difference(&drawn, &renderer.picture(), 6);
             assert!(share < 0.01, "{largest} at worst, {share} of the pixels differ");
         }
     });
@@ -143,7 +143,7 @@ fn a_ceiling_is_there_only_where_it_is_needed() {
         let bytes = |field: &Arc<Field>| {
             let technique = technique(field, "sorted-strips", &[]);
             let view = flight(field, 1, 1.0)[0];
-            let _stage = stage(gpu, field, &Look::default(), technique.as_ref(), &view);
+            let _stage = renderer(gpu, field, &Look::default(), technique.as_ref(), &view);
             gpu.device_bytes().get("ceiling").copied().unwrap_or(0)
         };
         assert!(bytes(&cave) >= 4 * 257 * 193);

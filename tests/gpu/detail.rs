@@ -12,12 +12,14 @@ use image::RgbaImage;
 
 use super::{difference, on_device, technique};
 
-fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, detail: bool, view: &View) -> RgbaImage {
+fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, detail: bool, view: &View) -> RgbaImage {
     let look = Look { detail, ..Look::default() };
     let mut technique = technique(field, "clusters", &["block=16"]);
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
+        .unwrap()
+        .with_requirements(technique.pipeline_requirements());
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
-    scene.shoot(technique.as_mut(), view, 1).unwrap().picture
+    scene.render(technique.as_mut(), view, 1).unwrap().picture
 }
 
 fn view(eye: DVec3, pitch: f64) -> View {
@@ -52,12 +54,12 @@ fn it_repeats_with_the_field_half_a_million_samples_away() {
         let above = |view: &View| field.height_at(view.eye.x, view.eye.z).unwrap() + 3.0;
         let here = View { eye: DVec3 { y: above(&here), ..here.eye }, ..here };
         let there = View { eye: here.eye + DVec3::new(1950.0, 0.0, 1940.0) * 4096.0, ..here };
-        let [a, b] = [here, there].map(|view| shoot(gpu, &field, true, &view));
+        let [a, b] = [here, there].map(|view| render(gpu, &field, true, &view));
         assert!(roughness(&a) > 2.0, "there is something to see: {}", roughness(&a));
         assert!(difference(&a, &b, 2).1 < 0.001, "{:?}", difference(&a, &b, 2));
         // A metre aside it is not the same.
         let aside = View { eye: there.eye + DVec3::X, ..there };
-        assert!(difference(&a, &shoot(gpu, &field, true, &aside), 2).1 > 0.3);
+        assert!(difference(&a, &render(gpu, &field, true, &aside), 2).1 > 0.3);
     });
 }
 
@@ -67,9 +69,9 @@ fn from_afar_it_fades_into_the_mean() {
         let flat = Field::new(Samples::F32(vec![0.0; 129 * 129]), [129; 2], [400.0; 2], Holes::none(129 * 129));
         let field = Arc::new(flat);
         let rough =
-            |height: f64| roughness(&shoot(gpu, &field, true, &view(field.world_at(64.0, 64.0, height), -90.0)));
+            |height: f64| roughness(&render(gpu, &field, true, &view(field.world_at(64.0, 64.0, height), -90.0)));
         let [near, far] = [2.0, 15_000.0].map(rough);
-        let plain = roughness(&shoot(gpu, &field, false, &view(field.world_at(64.0, 64.0, 2.0), -90.0)));
+        let plain = roughness(&render(gpu, &field, false, &view(field.world_at(64.0, 64.0, 2.0), -90.0)));
         println!("{near} near, {far} far, {plain} without");
         assert!(near > 3.0 && far < near / 3.0 && plain < 0.1, "{near} near, {far} far, {plain} without");
     });
@@ -84,9 +86,11 @@ fn memory_does_not_grow_with_the_tiling() {
             let view = view(field.world_at(300.0, 300.0, 2000.0), -30.0);
             let look = Look { detail: true, ..Look::default() };
             let mut technique = technique(&field, "clusters", &["block=16"]);
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
+            let plan = ScenePlan::new(&field, &look, &gpu.device_limits())
+                .unwrap()
+                .with_requirements(technique.pipeline_requirements());
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
-            scene.shoot(technique.as_mut(), &view, 1).unwrap().device_bytes
+            scene.render(technique.as_mut(), &view, 1).unwrap().device_bytes
         });
         assert_eq!(bytes[0], bytes[1]);
     });

@@ -7,11 +7,11 @@ use cuesta::height::bezier::{Bezier, LAYERS, SIDE_M};
 use cuesta::view::View;
 use glam::DVec3;
 
-use super::{aslant, on_device, shoot, technique};
+use super::{aslant, on_device, render, technique};
 
 /// From far and near the picture is land below a sky, lit by slopes: no two rows of it alike.
 #[test]
-fn the_endless_land_is_drawn_and_lit() {
+fn the_endless_terrain_is_drawn_and_lit() {
     on_device(|gpu| {
         let field = Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))));
         let [x, z] = [0.43 * SIDE_M, 0.37 * SIDE_M];
@@ -21,12 +21,16 @@ fn the_endless_land_is_drawn_and_lit() {
             let eye = DVec3::new(x, ground + above_m, z);
             let view =
                 View { eye, world_from_eye: View::turned(40.0, -12.0, 0.0), near: 0.1 * above_m.min(1.0), ..like };
-            let shot = shoot(gpu, &field, technique(&field, "sphere-tree", &[]).as_mut(), &view);
-            let land: Vec<_> =
-                shot.picture.pixels().filter(|pixel| pixel.0[3] == 255).map(|p| f64::from(p.0[1])).collect();
-            assert!(land.len() > 160 * 40 && land.len() < 160 * 120, "{above_m} m: {} pixels of land", land.len());
-            let mean = land.iter().sum::<f64>() / land.len() as f64;
-            let deviation = (land.iter().map(|n| (n - mean).powi(2)).sum::<f64>() / land.len() as f64).sqrt();
+            let rendered = render(gpu, &field, technique(&field, "sphere-tree", &[]).as_mut(), &view);
+            let terrain: Vec<_> =
+                rendered.picture.pixels().filter(|pixel| pixel.0[3] == 255).map(|p| f64::from(p.0[1])).collect();
+            assert!(
+                terrain.len() > 160 * 40 && terrain.len() < 160 * 120,
+                "{above_m} m: {} pixels of land",
+                terrain.len()
+            );
+            let mean = terrain.iter().sum::<f64>() / terrain.len() as f64;
+            let deviation = (terrain.iter().map(|n| (n - mean).powi(2)).sum::<f64>() / terrain.len() as f64).sqrt();
             assert!(deviation > 2.0, "{above_m} m: all land is alike, {deviation} of 255 about {mean}");
         }
     });

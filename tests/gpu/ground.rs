@@ -6,7 +6,7 @@ use cuesta::gpu::Gpu;
 use cuesta::height::Field;
 use cuesta::height::synth::{Kind, synth};
 use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::texture::ground::Ground;
 use cuesta::texture::working_set::Node;
 use cuesta::view::{Lens, View};
@@ -20,28 +20,28 @@ fn field() -> Arc<Field> {
     Arc::new(synth(Kind::Fractal, [129, 129], 5))
 }
 
-fn stage(
+fn renderer(
     gpu: &Arc<Gpu>,
     field: &Arc<Field>,
     name: &str,
     look: &Look,
     picture: Option<&RgbaImage>,
     view: &View,
-) -> Stage {
+) -> SceneRenderer {
     let (limits, technique) = (gpu.device_limits(), technique(field, name, &[]));
-    let plan = ScenePlan::new(field, look, &limits).unwrap().with_manner(technique.manner());
+    let plan = ScenePlan::new(field, look, &limits).unwrap().with_requirements(technique.pipeline_requirements());
     let size = picture.map(|picture| picture.dimensions().into());
     let plan = plan.with_overlay(field, look, &limits, size).unwrap();
-    Scene { gpu, field, plan: &plan, look, overlay: picture }.stage(technique.as_ref(), view.size).unwrap()
+    Scene { gpu, field, plan: &plan, look, overlay: picture }.renderer(technique.as_ref(), view.size).unwrap()
 }
 
-fn drawn(stage: &mut Stage, field: &Arc<Field>, name: &str, view: &View, settles: bool) -> RgbaImage {
+fn drawn(renderer: &mut SceneRenderer, field: &Arc<Field>, name: &str, view: &View, settles: bool) -> RgbaImage {
     let mut technique = technique(field, name, &[]);
     if settles {
-        stage.settle(technique.as_mut(), view).unwrap();
+        renderer.settle(technique.as_mut(), view).unwrap();
     }
-    stage.draw(technique.as_mut(), view, Copy::Picture).unwrap();
-    stage.picture()
+    renderer.draw(technique.as_mut(), view, Copy::Picture).unwrap();
+    renderer.picture()
 }
 
 fn looking(colour: Colour) -> Look {
@@ -72,18 +72,18 @@ fn nodes_show_the_whole_ground() {
         let cells = 512;
         let tile = Ground::new(&field).tile(Node { level: 0, at: [0, 0] }, cells);
         let whole = RgbaImage::from_fn(cells + 1, cells + 1, |x, z| Rgba(tile[(z * (cells + 1) + x) as usize]));
-        let mut by_picture = stage(gpu, &field, "sphere-tree", &looking(Colour::Overlay), Some(&whole), &view);
+        let mut by_picture = renderer(gpu, &field, "sphere-tree", &looking(Colour::Overlay), Some(&whole), &view);
         let by_picture = drawn(&mut by_picture, &field, "sphere-tree", &view, false);
         for name in ["sphere-tree", "clusters:gpu-driven", "smooth-tiles"] {
-            let mut in_nodes = stage(gpu, &field, name, &looking(Colour::Ground), None, &view);
+            let mut in_nodes = renderer(gpu, &field, name, &looking(Colour::Ground), None, &view);
             let coarse = drawn(&mut in_nodes, &field, name, &view, false);
-            let waiting = in_nodes.maps().expect("in parts").waiting;
-            assert!(waiting > 10, "{name}: {waiting} to come");
+            let pending = in_nodes.maps().expect("in parts").pending;
+            assert!(pending > 10, "{name}: {pending} to come");
             let fine = drawn(&mut in_nodes, &field, name, &view, true);
-            let figures = in_nodes.maps().expect("in parts");
-            assert!(figures.waiting == 0 && figures.held > waiting && figures.texel_px == 1.0, "{name}: {figures}");
+            let stats = in_nodes.maps().expect("in parts");
+            assert!(stats.pending == 0 && stats.held > pending && stats.texel_px == 1.0, "{name}: {stats}");
             let [coarse, fine] = [coarse, fine].map(|picture| mean(&picture, &by_picture));
-            println!("{name}: {coarse:.2} from the root alone, {fine:.2} at rest; {figures}");
+            println!("{name}: {coarse:.2} from the root alone, {fine:.2} at rest; {stats}");
             assert!(fine < 4.0 && coarse > 1.5 * fine, "{name}: {coarse} then {fine} apart on the mean");
         }
     });
@@ -96,14 +96,14 @@ fn nodes_come_and_go_on_a_way_to_the_ground() {
         let field = field();
         let look = Look { texture_bytes: 12_000_000, ..looking(Colour::Nodes) };
         let first = aslant(&field, [200, 120], 1.0);
-        let mut stage = stage(gpu, &field, "sphere-tree", &look, None, &first);
+        let mut renderer = renderer(gpu, &field, "sphere-tree", &look, None, &first);
         let ground = field.world_at(64.3, 64.7, f64::from(field.height(64, 64)));
         let mut pictures = Vec::new();
         for k in 0..8 {
             let view = View { eye: ground + (first.eye - ground) * 0.4f64.powi(k), near: 0.01, ..first };
-            pictures.push(drawn(&mut stage, &field, "sphere-tree", &view, k % 2 == 1));
-            let figures = stage.maps().expect("in parts");
-            assert!(figures.bytes <= 12_000_000 && figures.held <= figures.slots, "{figures}");
+            pictures.push(drawn(&mut renderer, &field, "sphere-tree", &view, k % 2 == 1));
+            let stats = renderer.maps().expect("in parts");
+            assert!(stats.bytes <= 12_000_000 && stats.held <= stats.slots, "{stats}");
             // A device may keep rows longer than they are.
             let held = gpu.device_bytes()["ground texels"];
             assert!(held <= 18_000_000, "{held} bytes");
@@ -120,7 +120,7 @@ fn without_a_ground_there_are_no_texels() {
         let field = field();
         let view = above(&field);
         let bytes = |colour| {
-            let _stage = stage(gpu, &field, "sphere-tree", &looking(colour), None, &view);
+            let _stage = renderer(gpu, &field, "sphere-tree", &looking(colour), None, &view);
             gpu.device_bytes().get("ground texels").copied().unwrap_or(0)
         };
         assert_eq!(bytes(Colour::Height), 0);

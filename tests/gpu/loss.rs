@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::device::DeviceLaboratory;
+use cuesta::bench::device::DeviceBackend;
 use cuesta::bench::results::Results;
 use cuesta::bench::rows::Row;
 use cuesta::bench::run::{Ended, Run};
-use cuesta::bench::{Case, Laboratory, Terrain, journal};
+use cuesta::bench::{BenchBackend, Case, Terrain, journal};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::TECHNIQUES;
@@ -45,10 +45,10 @@ fn render(step: usize) {
             println!("{}: an error at each of {count} calls, {step} apart", entry.name);
             assert!(count > 20, "{}: {count} calls", entry.name);
         }
-        let driven = lose(gpu, &field, "clusters:gpu-driven", drawn, step);
+        let gpu_selector = lose(gpu, &field, "clusters:gpu-driven", drawn, step);
         let all = lose(gpu, &field, "clusters", measured, step);
-        println!("selecting on the device: {driven}; measured: {all}");
-        assert!(driven > 20 && all > driven, "{driven} and {all}");
+        println!("selecting on the device: {gpu_selector}; measured: {all}");
+        assert!(gpu_selector > 20 && all > gpu_selector, "{gpu_selector} and {all}");
     });
 }
 
@@ -69,11 +69,11 @@ fn bench(gpu: &Arc<Gpu>, folder: &Path, (terrain, field): &(Terrain, Arc<Field>)
         let path = mock::case(terrain, name, 2.0, "certified", "spin");
         Case { size: [32, 20], frames: 2, every: 1, ..path }
     };
-    let mut laboratory = DeviceLaboratory::new(Arc::clone(gpu), Look::default());
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
     let fields = vec![(terrain.clone(), Arc::clone(field))];
     let (cases, stop) = (vec![case("geomipmap"), case("clusters")], AtomicBool::new(false));
-    let header = mock::header(&mut laboratory as &mut dyn Laboratory, &fields);
-    Run { folder, cases, fields, rounds: 1, warm_up: 1, stop: &stop }.run(&mut laboratory, header, &mut |_| {})
+    let header = mock::header(&mut backend as &mut dyn BenchBackend, &fields);
+    Run { folder, cases, fields, rounds: 1, warm_up: 1, stop: &stop }.run(&mut backend, header, &mut |_| {})
 }
 
 /// What tells rows apart.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cuesta::gpu::Gpu;
 use cuesta::height::Field;
 use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::{Lens, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
@@ -38,20 +38,20 @@ fn plan(gpu: &Gpu, field: &Arc<Field>, look: &Look, picture: &RgbaImage) -> Scen
     let limits = gpu.device_limits();
     let plan = ScenePlan::new(field, look, &limits).unwrap();
     let plan = plan.with_overlay(field, look, &limits, Some(picture.dimensions().into())).unwrap();
-    plan.with_manner(technique(field, "sorted-strips", &[]).manner())
+    plan.with_requirements(technique(field, "sorted-strips", &[]).pipeline_requirements())
 }
 
 /// A scene made ready for strips with so many bytes for the picture.
-fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, texture_bytes: u64, view: &View) -> Stage {
+fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, texture_bytes: u64, view: &View) -> SceneRenderer {
     let look = look(texture_bytes);
     let plan = plan(gpu, field, &look, picture);
     let strips = technique(field, "sorted-strips", &[]);
-    Scene { gpu, field, plan: &plan, look: &look, overlay: Some(picture) }.stage(strips.as_ref(), view.size).unwrap()
+    Scene { gpu, field, plan: &plan, look: &look, overlay: Some(picture) }.renderer(strips.as_ref(), view.size).unwrap()
 }
 
-fn drawn(stage: &mut Stage, field: &Arc<Field>, view: &View) -> RgbaImage {
-    stage.draw(technique(field, "sorted-strips", &[]).as_mut(), view, Copy::Picture).unwrap();
-    stage.picture()
+fn drawn(renderer: &mut SceneRenderer, field: &Arc<Field>, view: &View) -> RgbaImage {
+    renderer.draw(technique(field, "sorted-strips", &[]).as_mut(), view, Copy::Picture).unwrap();
+    renderer.picture()
 }
 
 const WHOLE: u64 = 1 << 30;
@@ -87,12 +87,12 @@ fn maps_show_the_picture_without_seams() {
         let field = field();
         let picture = picture(&field);
         let view = above(&field, field.world_at(63.0, 47.0, 9000.0), 2.0);
-        let whole = drawn(&mut stage(gpu, &field, &picture, WHOLE, &view), &field, &view);
-        let mut parts = stage(gpu, &field, &picture, PARTS, &view);
+        let whole = drawn(&mut renderer(gpu, &field, &picture, WHOLE, &view), &field, &view);
+        let mut parts = renderer(gpu, &field, &picture, PARTS, &view);
         parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &view).unwrap();
         let in_parts = drawn(&mut parts, &field, &view);
         let maps = parts.maps().expect("in parts");
-        assert!(maps.waiting == 0 && maps.texel_px == 1.0 && maps.bytes <= PARTS, "{maps}");
+        assert!(maps.pending == 0 && maps.texel_px == 1.0 && maps.bytes <= PARTS, "{maps}");
         // North is up: x goes right and z down.
         let place = |k: usize, n: u32| {
             let (first, size) = ([view.eye.x, view.eye.z][k], [320.0, 240.0][k]);
@@ -115,9 +115,9 @@ fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
         let picture = picture(&field);
         let view = aslant(&field, [320, 240], 1.0);
         let near = above(&field, field.world_at(30.0, 30.0, 9000.0), 2.0);
-        let mut parts = stage(gpu, &field, &picture, PARTS, &view);
+        let mut parts = renderer(gpu, &field, &picture, PARTS, &view);
         let first = drawn(&mut parts, &field, &near);
-        assert!(parts.maps().unwrap().waiting > 0);
+        assert!(parts.maps().unwrap().pending > 0);
         parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &near).unwrap();
         let settled = drawn(&mut parts, &field, &near);
         assert!(difference(&first, &settled, 8).1 > 0.5, "the root alone shows waves of a dozen texels");
@@ -137,16 +137,16 @@ fn maps_come_and_go_on_a_way() {
     on_device(|gpu| {
         let field = field();
         let picture = picture(&field);
-        let least = 500_000;
+        let min = 500_000;
         let at = |x: f64| above(&field, field.world_at(x, 47.0, 9000.0), 2.0);
-        let mut parts = stage(gpu, &field, &picture, least, &at(20.0));
+        let mut parts = renderer(gpu, &field, &picture, min, &at(20.0));
         let mut held = Vec::new();
         for frame in 0..40 {
             let view = at(20.0 + 2.0 * f64::from(frame));
             let shown = drawn(&mut parts, &field, &view);
             assert!(shown.pixels().all(|pixel| pixel.0[3] == 255));
             let maps = parts.maps().unwrap();
-            assert!(maps.bytes <= least && maps.texel_px > 1.0, "{maps}");
+            assert!(maps.bytes <= min && maps.texel_px > 1.0, "{maps}");
             held.push(maps.held);
         }
         assert!(held.iter().max() > held.iter().min());

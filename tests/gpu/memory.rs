@@ -16,9 +16,9 @@ use super::{aslant, on_device, technique};
 pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
-        let mut stage = scene.stage(technique, view.size)?;
-        stage.draw(technique, &view, Copy::PictureAndDepth)?;
-        stage.complete()
+        let mut renderer = scene.renderer(technique, view.size)?;
+        renderer.draw(technique, &view, Copy::PictureAndDepth)?;
+        renderer.complete()
     })
 }
 
@@ -26,13 +26,13 @@ pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) 
 pub fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
-        let mut stage = scene.stage(technique, view.size)?;
-        stage.draw(technique, &view, Copy::PictureAndDepth)?;
-        stage.complete()?;
-        stage.draw_floor(&view, Copy::Picture)?;
-        stage.capture(technique, &view)?;
-        stage.errors(technique, &view)?;
-        stage.draw_probed(technique, "probed", &view)?;
+        let mut renderer = scene.renderer(technique, view.size)?;
+        renderer.draw(technique, &view, Copy::PictureAndDepth)?;
+        renderer.complete()?;
+        renderer.draw_shading_only(&view, Copy::Picture)?;
+        renderer.capture(technique, &view)?;
+        renderer.errors(technique, &view)?;
+        renderer.draw_probed(technique, "probed", &view)?;
         Truth::new(scene, &view).map(|_| ())
     })
 }
@@ -44,7 +44,9 @@ fn with_scene(
     work: impl FnOnce(&Scene, &mut dyn Technique) -> Result<()>,
 ) -> Result<()> {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
+        .unwrap()
+        .with_requirements(technique.pipeline_requirements());
     work(&Scene { gpu, field, plan: &plan, look: &look, overlay: None }, technique)
 }
 
@@ -75,9 +77,9 @@ fn running_out_at_any_allocation_is_an_error_and_leaks_nothing() {
             println!("{}: an error at each of {count} allocations", entry.name);
             assert!(count > 10, "{}: {count} allocations", entry.name);
         }
-        let driven = fail_each(gpu, &field, "clusters:gpu-driven", drawn);
+        let gpu_selector = fail_each(gpu, &field, "clusters:gpu-driven", drawn);
         let all = fail_each(gpu, &field, "clusters", measured);
-        println!("selecting on the device: {driven}; measured: {all}");
-        assert!(driven > 10 && all > driven, "{driven} and {all}");
+        println!("selecting on the device: {gpu_selector}; measured: {all}");
+        assert!(gpu_selector > 10 && all > gpu_selector, "{gpu_selector} and {all}");
     });
 }

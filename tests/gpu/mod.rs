@@ -5,23 +5,23 @@ mod bench;
 mod capture;
 mod cave;
 mod detail;
-mod driven;
+mod draw_list;
 mod endless;
 mod golden;
+mod gpu_selection;
 mod ground;
 mod holes;
 mod layout;
 mod loss;
 mod maps;
 mod memory;
-mod neck;
 mod overlay;
 mod painter;
 mod parts;
 mod plan;
+mod position_check;
 mod skirts;
 mod soak;
-mod twin;
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ use cuesta::gpu::{Choice, Gpu, Instance};
 use cuesta::height::{Field, Holes, Samples, synth};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Scene, Shot};
+use cuesta::scene::{RenderResult, Scene};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
@@ -66,27 +66,29 @@ pub(crate) fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Bo
 }
 
 /// The picture of a field under a plan.
-fn shoot_planned(
+fn render_planned(
     gpu: &Arc<Gpu>,
     field: &Arc<Field>,
     plan: &ScenePlan,
     technique: &mut dyn Technique,
     view: &View,
-) -> Shot {
+) -> RenderResult {
     let look = Look::default();
-    Scene { gpu, field, plan, look: &look, overlay: None }.shoot(technique, view, 1).expect("a picture")
+    Scene { gpu, field, plan, look: &look, overlay: None }.render(technique, view, 1).expect("a picture")
 }
 
 /// The picture of a field with the default look.
-fn shoot(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> Shot {
-    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits()).unwrap().with_manner(technique.manner());
-    shoot_planned(gpu, field, &plan, technique, view)
+fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> RenderResult {
+    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
+        .unwrap()
+        .with_requirements(technique.pipeline_requirements());
+    render_planned(gpu, field, &plan, technique, view)
 }
 
 /// Mountains with a hole, 16-bit, not square.
 pub(crate) fn mountains() -> Arc<Field> {
-    let land = synth::synth(synth::Kind::Fractal, [131, 97], 5);
-    let codes = (0..land.samples().len()).map(|k| (land.samples().height(k) * 10.0).round() as u16).collect();
+    let terrain = synth::synth(synth::Kind::Fractal, [131, 97], 5);
+    let codes = (0..terrain.samples().len()).map(|k| (terrain.samples().height(k) * 10.0).round() as u16).collect();
     let samples = Samples::Coded { codes, zero: 0.0, scale: 0.1 };
     let mut holes = Holes::none(samples.len());
     for (j, i) in (30..45).flat_map(|j| (60..85).map(move |i| (j, i))) {
@@ -134,7 +136,7 @@ fn difference(a: &image::RgbaImage, b: &image::RgbaImage, threshold: u8) -> (u8,
 }
 
 #[test]
-fn hole_pixels_are_sky_and_all_others_land() {
+fn hole_pixels_are_sky_and_all_others_terrain() {
     on_device(|gpu| {
         let field = mountains();
         let mut view = aslant(&field, [131, 97], 1.0);
@@ -144,9 +146,9 @@ fn hole_pixels_are_sky_and_all_others_land() {
         view.world_from_eye = View::looking_along(DVec3::NEG_Y);
         view.lens = Lens::Orthographic { width: 131.0 * 20.0, far: 20_000.0 };
         for name in ["brute-force", "geomipmap"] {
-            let shot = shoot(gpu, &field, technique(&field, name, &[]).as_mut(), &view);
+            let rendered = render(gpu, &field, technique(&field, name, &[]).as_mut(), &view);
             let mut seen = [0; 2];
-            for (x, y, pixel) in shot.picture.enumerate_pixels() {
+            for (x, y, pixel) in rendered.picture.enumerate_pixels() {
                 // Ground under the pixel's centre, in samples.
                 let i = f64::from(x) + 0.5 - 0.5;
                 let j = (f64::from(y) + 0.5 - 97.0 / 2.0) * 20.0 / 25.0 + h / 2.0;
@@ -173,12 +175,13 @@ fn a_tiny_tolerance_draws_what_brute_force_draws() {
     on_device(|gpu| {
         let field = mountains();
         let view = aslant(&field, [160, 120], 1e-6);
-        let truth = shoot(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
+        let truth = render(gpu, &field, technique(&field, "brute-force", &[]).as_mut(), &view);
         for settings in [&["block=9"][..], &["block=65", "masks=16"]] {
-            let drawn = shoot(gpu, &field, technique(&field, "geomipmap", settings).as_mut(), &view);
+            let drawn = render(gpu, &field, technique(&field, "geomipmap", settings).as_mut(), &view);
             assert_eq!(drawn.picture, truth.picture, "{settings:?}");
         }
-        let coarse = shoot(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &aslant(&field, [160, 120], 8.0));
+        let coarse =
+            render(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &aslant(&field, [160, 120], 8.0));
         assert_ne!(coarse.picture, truth.picture, "a wide tolerance is seen");
     });
 }
@@ -192,8 +195,8 @@ fn ten_million_metres_from_the_origin_nothing_moves() {
         let far = Arc::new(far);
         let here = aslant(&field, [160, 120], 1.0);
         let there = View { eye: here.eye + DVec3::new(1.0e7, 0.0, -6.4e6), ..here };
-        let a = shoot(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &here);
-        let b = shoot(gpu, &far, technique(&far, "geomipmap", &[]).as_mut(), &there);
+        let a = render(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &here);
+        let b = render(gpu, &far, technique(&far, "geomipmap", &[]).as_mut(), &there);
         // The eye itself is rounded to 2 nm there: not a pixel may notice.
         assert!(difference(&a.picture, &b.picture, 2).1 < 0.001);
     });
@@ -204,8 +207,8 @@ fn recorded_draws_and_indirect_ones_give_the_same_picture() {
     on_device(|gpu| {
         let field = mountains();
         let view = aslant(&field, [160, 120], 1.0);
-        let indirect = shoot(gpu, &field, technique(&field, "geomipmap", &["block=17"]).as_mut(), &view);
-        let direct = shoot(gpu, &field, technique(&field, "geomipmap:draw-per-block", &["block=17"]).as_mut(), &view);
+        let indirect = render(gpu, &field, technique(&field, "geomipmap", &["block=17"]).as_mut(), &view);
+        let direct = render(gpu, &field, technique(&field, "geomipmap:draw-per-block", &["block=17"]).as_mut(), &view);
         assert_eq!(indirect.list.triangles(), direct.list.triangles());
         assert_eq!(indirect.picture, direct.picture);
         assert_eq!(indirect.list.commands(), 1);

@@ -55,13 +55,13 @@ fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, look: &Look, v
     let limits = gpu.device_limits();
     let plan = ScenePlan::new(field, look, &limits).unwrap();
     let plan = plan.with_overlay(field, look, &limits, Some(picture.dimensions().into())).unwrap();
-    let plan = plan.with_manner(technique.manner());
+    let plan = plan.with_requirements(technique.pipeline_requirements());
     assert_eq!(plan.maps.is_some(), look.texture_bytes < 1 << 20, "whole, or in maps");
     let scene = Scene { gpu, field, plan: &plan, look, overlay: Some(picture) };
-    let mut stage = scene.stage(technique.as_ref(), view.size).unwrap();
-    stage.settle(technique.as_mut(), view).unwrap();
-    stage.draw(technique.as_mut(), view, Copy::Picture).unwrap();
-    stage.picture()
+    let mut renderer = scene.renderer(technique.as_ref(), view.size).unwrap();
+    renderer.settle(technique.as_mut(), view).unwrap();
+    renderer.draw(technique.as_mut(), view, Copy::Picture).unwrap();
+    renderer.picture()
 }
 
 /// The look of a picture that lies so.

@@ -4,22 +4,24 @@
 use std::sync::Arc;
 
 use cuesta::bench::paths;
-use cuesta::draw::{DrawList, Geometry, Hiding, Limits, Manner};
+use cuesta::draw::{DepthMode, DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
 use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::{Metric, Tolerance, View};
 
-use super::{aslant, mountains, on_device, shoot, technique};
+use super::{aslant, mountains, on_device, render, technique};
 
 const SIZE: [u32; 2] = [96, 64];
 
-pub(super) fn stage(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Stage {
+pub(super) fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap().with_manner(technique.manner());
-    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.stage(technique, size).unwrap()
+    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
+        .unwrap()
+        .with_requirements(technique.pipeline_requirements());
+    Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, size).unwrap()
 }
 
 /// A technique's lists as they are, drawn without a depth buffer.
@@ -38,8 +40,8 @@ impl Technique for Painted {
     fn keeps_tolerance(&self) -> bool {
         self.0.keeps_tolerance()
     }
-    fn manner(&self) -> Manner {
-        Manner { hiding: Hiding::ByOrder, ..self.0.manner() }
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        PipelineRequirements { depth_mode: DepthMode::Painter, ..self.0.pipeline_requirements() }
     }
 }
 
@@ -68,21 +70,21 @@ fn without_a_depth_buffer_no_pixel_differs_on_any_named_path() {
                 sorted(&[level, "order=painter"]),
                 Box::new(Painted(sorted(&[level, "order=front"]))),
             ];
-            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref(), SIZE));
+            let mut stages = drawn.each_ref().map(|technique| renderer(gpu, &field, technique.as_ref(), SIZE));
             for path in paths::PATHS {
-                let (mut wrong, mut land) = (0, 0);
+                let (mut wrong, mut terrain) = (0, 0);
                 for view in path.views(&field, 200, SIZE, tolerance).iter().step_by(19) {
                     let mut picture = |k: usize| {
                         stages[k].draw(drawn[k].as_mut(), view, Copy::Picture).unwrap();
                         stages[k].picture()
                     };
                     let [with_depth, painted, nearest_first] = [0, 1, 2].map(&mut picture);
-                    land += with_depth.pixels().filter(|p| p.0[3] > 0).count();
+                    terrain += with_depth.pixels().filter(|p| p.0[3] > 0).count();
                     wrong += differing(&with_depth, &painted);
                     unsorted += differing(&with_depth, &nearest_first);
                 }
-                println!("{level} {}: {wrong} of {land} pixels differ", path.name);
-                assert!(land > 0 && wrong == 0, "{level} {}: {wrong} pixels differ", path.name);
+                println!("{level} {}: {wrong} of {terrain} pixels differ", path.name);
+                assert!(terrain > 0 && wrong == 0, "{level} {}: {wrong} pixels differ", path.name);
             }
         }
         assert!(unsorted > 1000, "the order matters: {unsorted} pixels differ nearest first");
@@ -97,13 +99,13 @@ fn depths_are_there_for_who_asks() {
         let view = aslant(&field, SIZE, 1.0);
         let [deep, painted] = ["order=back", "order=painter"].map(|order| {
             let mut technique = technique(&field, "sorted-strips", &[order]);
-            let mut stage = stage(gpu, &field, technique.as_ref(), SIZE);
-            stage.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
+            let mut renderer = renderer(gpu, &field, technique.as_ref(), SIZE);
+            renderer.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
             assert_eq!(depth_bytes(gpu) > 0, order == "order=back");
-            stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
-            let (picture, depth) = (stage.picture(), stage.depth());
-            stage.draw_floor(&view, Copy::Picture).unwrap();
-            (picture, depth, stage.picture())
+            renderer.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
+            let (picture, depth) = (renderer.picture(), renderer.depth());
+            renderer.draw_shading_only(&view, Copy::Picture).unwrap();
+            (picture, depth, renderer.picture())
         });
         assert!(deep.1.iter().any(|&depth| depth > 0.0) && deep == painted);
     });
@@ -116,10 +118,10 @@ fn a_probed_frame_is_painted_too() {
         let field = mountains();
         let view = aslant(&field, SIZE, 1.0);
         let mut sorted = technique(&field, "sorted-strips", &["order=painter"]);
-        let shown = shoot(gpu, &field, sorted.as_mut(), &view).picture;
-        let mut stage = stage(gpu, &field, sorted.as_ref(), SIZE);
-        stage.draw_probed(sorted.as_mut(), "sorted-strips", &view).unwrap();
-        assert_eq!(differing(&stage.picture(), &shown), 0);
+        let shown = render(gpu, &field, sorted.as_mut(), &view).picture;
+        let mut renderer = renderer(gpu, &field, sorted.as_ref(), SIZE);
+        renderer.draw_probed(sorted.as_mut(), "sorted-strips", &view).unwrap();
+        assert_eq!(differing(&renderer.picture(), &shown), 0);
         assert_eq!(depth_bytes(gpu), 0);
     });
 }
@@ -135,16 +137,16 @@ fn nearest_first_nothing_is_drawn_over() {
         view.world_from_eye = View::turned(-35.0, -3.0, 0.0);
         let passed = ["front", "shuffled", "back", "painter"].map(|order| {
             let mut technique = technique(&field, "sorted-strips", &[&format!("order={order}")]);
-            let mut stage = stage(gpu, &field, technique.as_ref(), SIZE);
-            let times = stage.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
-            let covered = stage.picture().pixels().filter(|p| p.0[3] > 0).count() as u64;
+            let mut renderer = renderer(gpu, &field, technique.as_ref(), SIZE);
+            let times = renderer.draw(technique.as_mut(), &view, Copy::PictureAndDepth).unwrap();
+            let covered = renderer.picture().pixels().filter(|p| p.0[3] > 0).count() as u64;
             times.gpu.passed.map(|passed| (passed, covered))
         });
         println!("fragments past the depth test, and pixels of land: {passed:?}");
-        let [Some((front, land)), Some((shuffled, _)), Some((back, _)), Some((painter, _))] = passed else {
+        let [Some((front, terrain)), Some((shuffled, _)), Some((back, _)), Some((painter, _))] = passed else {
             return println!("skipped: this device does not count fragments");
         };
-        assert!(land > 1000 && front == land, "{passed:?}");
+        assert!(terrain > 1000 && front == terrain, "{passed:?}");
         assert!(shuffled > front + 50 && back > shuffled + 50 && painter >= back, "{passed:?}");
     });
 }
@@ -156,7 +158,7 @@ fn narrow_indices_show_what_wide_ones_do() {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
         let view = aslant(&field, SIZE, 1e-6);
         let [narrow, wide] = ["order=front", "order=shuffled"]
-            .map(|order| shoot(gpu, &field, technique(&field, "sorted-strips", &[order]).as_mut(), &view));
+            .map(|order| render(gpu, &field, technique(&field, "sorted-strips", &[order]).as_mut(), &view));
         let highest = |list: &DrawList| list.streamed.indices.iter().copied().max();
         assert!(highest(&narrow.list) <= Some(65535) && highest(&wide.list) > Some(65535));
         assert!(narrow.picture.pixels().filter(|p| p.0[3] > 0).count() > 1000);

@@ -7,7 +7,7 @@ use cuesta::draw::layout::Frame;
 use cuesta::scene::Copy;
 use cuesta::view::{Metric, Tolerance};
 
-use super::painter::stage;
+use super::painter::renderer;
 use super::{mountains, on_device, technique};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -20,8 +20,8 @@ fn parts_show_what_the_whole_shows() {
         for order in ["order=front", "order=back", "order=painter"] {
             let mut drawn = ["parts=1", "parts=2", "parts=5"]
                 .map(|parts| technique(&field, "sorted-strips", &["page=16", order, parts]));
-            let (mut passes, mut land) = ([0; 3], 0);
-            let mut stages = drawn.each_ref().map(|technique| stage(gpu, &field, technique.as_ref(), SIZE));
+            let (mut passes, mut terrain) = ([0; 3], 0);
+            let mut stages = drawn.each_ref().map(|technique| renderer(gpu, &field, technique.as_ref(), SIZE));
             for view in paths::find("corner").unwrap().views(&field, 6, SIZE, tolerance) {
                 let pictures = [0, 1, 2].map(|k| {
                     let times = stages[k].draw(drawn[k].as_mut(), &view, Copy::PictureAndDepth).unwrap();
@@ -31,9 +31,9 @@ fn parts_show_what_the_whole_shows() {
                     (stages[k].picture(), stages[k].depth())
                 });
                 assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]), "{order}");
-                land += pictures[0].0.pixels().filter(|p| p.0[3] > 0).count();
+                terrain += pictures[0].0.pixels().filter(|p| p.0[3] > 0).count();
             }
-            assert!(land > 3000, "{order}: {land} pixels of land");
+            assert!(terrain > 3000, "{order}: {terrain} pixels of land");
             // Few rows of pages are in sight now and then: then there are fewer parts.
             assert!(passes[0] == 6 && passes[1] > 9 && passes[2] > 15, "{order}: {passes:?}");
         }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{Manner, Morph};
+use cuesta::draw::{Morph, PipelineRequirements};
 use cuesta::height::Field;
 use cuesta::plan::{Colour, DeviceLimits, FEATURES, Forced, Look, ScenePlan};
 use cuesta::scene::{Scene, savings};
 
-use super::{as_f32, aslant, difference, mountains, on_device, shoot_planned, technique};
+use super::{as_f32, aslant, difference, mountains, on_device, render_planned, technique};
 
 fn without_holes() -> Arc<Field> {
     Arc::new((*mountains()).clone().without_holes())
@@ -18,31 +18,37 @@ fn forced_features_show_the_same_picture() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
-        let shoot = |field: &Arc<Field>, plan: &ScenePlan| {
-            shoot_planned(gpu, field, plan, technique(field, "geomipmap", &["block=17"]).as_mut(), &view).picture
+        let render = |field: &Arc<Field>, plan: &ScenePlan| {
+            render_planned(gpu, field, plan, technique(field, "geomipmap", &["block=17"]).as_mut(), &view).picture
         };
         let plan = ScenePlan::new(&field, &Look::default(), &gpu.device_limits()).unwrap();
         assert!(plan.coded && !plan.holes && !plan.tiled && !plan.fog && plan.page_shift == 0 && plan.filtered);
-        let lean = shoot(&field, &plan);
-        let same = |name: &str, forced: ScenePlan| assert_eq!(shoot(&field, &forced), lean, "{name}");
+        let lean = render(&field, &plan);
+        let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
         // Nobody says how far.
-        same("morphing", plan.clone().with_manner(Manner { morph: Morph::ByInstance, ..Manner::default() }));
+        same(
+            "morphing",
+            plan.clone().with_requirements(PipelineRequirements {
+                morph: Morph::ByInstance,
+                ..PipelineRequirements::default()
+            }),
+        );
         // The look's density is 0.
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });
         let normals = Look { colour: Colour::Normal, ..Look::default() };
         let of_normals = ScenePlan::new(&field, &normals, &gpu.device_limits()).unwrap();
         let detailed = ScenePlan { detail: true, ..of_normals.clone() };
-        assert_eq!(shoot(&field, &detailed), shoot(&field, &of_normals), "detail");
+        assert_eq!(render(&field, &detailed), render(&field, &of_normals), "detail");
         let wide = as_f32(&field);
         let wide_plan = ScenePlan { coded: false, ..plan.clone() };
-        assert!(difference(&shoot(&wide, &wide_plan), &lean, 2).1 < 0.01, "32-bit heights");
+        assert!(difference(&render(&wide, &wide_plan), &lean, 2).1 < 0.01, "32-bit heights");
         let unfiltered = ScenePlan { filtered: false, ..plan.clone() };
-        assert!(difference(&shoot(&field, &unfiltered), &lean, 3).1 < 0.01, "filtering in the shader");
+        assert!(difference(&render(&field, &unfiltered), &lean, 3).1 < 0.01, "filtering in the shader");
         let paged = ScenePlan { page_shift: 5, ..unfiltered.clone() };
-        assert_eq!(shoot(&field, &paged), shoot(&field, &unfiltered), "pages");
+        assert_eq!(render(&field, &paged), render(&field, &unfiltered), "pages");
     });
 }
 
@@ -65,21 +71,21 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
         ] {
             let mut techniques = [technique(&field, name, settings), technique(&field, name, settings)];
             let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
-            let plan = plan.with_manner(techniques[0].manner());
+            let plan = plan.with_requirements(techniques[0].pipeline_requirements());
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let (lean, savings) = savings::measure(&scene, &mut techniques, &view, 1).unwrap();
             assert!(lean.bytes > 0 && lean.pipelines > 1 && lean.instructions > 100, "{name}: {lean:?}");
             for saving in savings {
                 println!("{name}: {saving:?}");
                 let texels = field.samples().len() as i64;
-                let least_bytes = match saving.feature {
+                let min_bytes = match saving.feature {
                     "32-bit heights" => 2 * texels,
                     "hole mask" => texels - 1,
                     "depth buffer" => 4 * 160 * 120,
                     "detail textures" => 1 << 20,
                     _ => 0,
                 };
-                assert!(saving.bytes >= least_bytes, "{name}: {saving:?}");
+                assert!(saving.bytes >= min_bytes, "{name}: {saving:?}");
                 let adds_programs =
                     ["lattice program", "explicit program", "triangle strips"].contains(&saving.feature);
                 assert_eq!(saving.pipelines > 0, adds_programs, "{name}: {saving:?}");
@@ -112,7 +118,7 @@ fn what_is_left_out_by_hand_is_not_there() {
             .map(|look| {
                 let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
                 let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
-                scene.shoot(technique(&field, "geomipmap", &["block=17"]).as_mut(), &view, 1).unwrap().picture
+                scene.render(technique(&field, "geomipmap", &["block=17"]).as_mut(), &view, 1).unwrap().picture
             });
         assert!(plain != foggy && plain == without);
     });
@@ -137,7 +143,7 @@ fn fog_and_colours_are_seen() {
             let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
             let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
-            pictures.push((look, scene.shoot(geomipmap.as_mut(), &view, 1).unwrap().picture));
+            pictures.push((look, scene.render(geomipmap.as_mut(), &view, 1).unwrap().picture));
         }
         for (k, (look, picture)) in pictures.iter().enumerate() {
             for (other, other_picture) in &pictures[..k] {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, Manner, skirts};
+use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements, skirts};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -12,7 +12,7 @@ use cuesta::scene::{Copy, Scene};
 use cuesta::stress::views;
 use cuesta::view::View;
 
-use super::{aslant, difference, on_device, shoot, technique};
+use super::{aslant, difference, on_device, render, technique};
 use crate::conformance::cases;
 
 /// Clusters whose skirts hang down so many times as deep.
@@ -38,8 +38,8 @@ impl Technique for Deeper {
     fn keeps_tolerance(&self) -> bool {
         self.inner.keeps_tolerance()
     }
-    fn manner(&self) -> Manner {
-        self.inner.manner()
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        self.inner.pipeline_requirements()
     }
 }
 
@@ -71,22 +71,27 @@ fn skirts_are_seen_where_levels_meet_and_hide_every_gap() {
             .into_iter()
             .flat_map(|(v, is)| ["morph=off", "morph=on"].map(|m| (v, is, m)))
         {
-            let stitched = shoot(gpu, &field, technique(&field, "clusters", &["block=8", morph]).as_mut(), &view);
-            let [flat, hung, deeper] =
-                [0.0, 1.0, 3.0].map(|factor| shoot(gpu, &field, &mut skirted(&field, morph, factor), &view).picture);
-            let open = [&stitched.picture, &flat, &hung].map(|picture| hole_pixels(gpu, &field, &view, picture));
-            println!("{morph}: {open:?} hole pixels, {} skirt pixels", count(&hung));
+            let stitched = render(gpu, &field, technique(&field, "clusters", &["block=8", morph]).as_mut(), &view);
+            let [flat, skirt_vertex, deeper] =
+                [0.0, 1.0, 3.0].map(|factor| render(gpu, &field, &mut skirted(&field, morph, factor), &view).picture);
+            let open =
+                [&stitched.picture, &flat, &skirt_vertex].map(|picture| hole_pixels(gpu, &field, &view, picture));
+            println!("{morph}: {open:?} hole pixels, {} skirt pixels", count(&skirt_vertex));
             assert!(open[0] == 0 && open[1] > 0 && open[2] == 0, "{morph}: {open:?} hole pixels");
             assert_eq!([count(&stitched.picture), count(&flat)], [0, 0]);
-            assert!(count(&hung) > 0, "{morph}");
+            assert!(count(&skirt_vertex) > 0, "{morph}");
             // A gap is closed by the first few metres: what hangs below is hidden.
-            assert!(!is_within || deeper == hung, "{morph}: {:?} differ", difference(&deeper, &hung, 0));
+            assert!(
+                !is_within || deeper == skirt_vertex,
+                "{morph}: {:?} differ",
+                difference(&deeper, &skirt_vertex, 0)
+            );
         }
     });
 }
 
 #[test]
-fn no_hole_pixels_on_any_field_of_the_laws() {
+fn no_hole_pixels_on_any_field_of_the_invariants() {
     on_device(|gpu| {
         let mut seen = 0;
         for (name, field) in cases::fields() {
@@ -97,13 +102,13 @@ fn no_hole_pixels_on_any_field_of_the_laws() {
             let truths: Vec<_> = views.map(|(what, view)| (what, view, Truth::new(&scene, &view).unwrap())).collect();
             for morph in ["morph=off", "morph=on"] {
                 let mut technique = skirted(&field, morph, 1.0);
-                let plan = plan.clone().with_manner(technique.manner());
-                let mut stage = Scene { plan: &plan, ..scene.clone() }.stage(&technique, [320, 180]).unwrap();
+                let plan = plan.clone().with_requirements(technique.pipeline_requirements());
+                let mut renderer = Scene { plan: &plan, ..scene.clone() }.renderer(&technique, [320, 180]).unwrap();
                 for (what, view, truth) in &truths {
-                    stage.draw(&mut technique, view, Copy::Picture).unwrap();
-                    let open = truth.hole_pixels(&scene, view, &stage.picture()).unwrap().len();
+                    renderer.draw(&mut technique, view, Copy::Picture).unwrap();
+                    let open = truth.hole_pixels(&scene, view, &renderer.picture()).unwrap().len();
                     assert_eq!(open, 0, "{name}, {what}, {morph}");
-                    seen += count(&stage.picture());
+                    seen += count(&renderer.picture());
                 }
             }
         }

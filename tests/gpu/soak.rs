@@ -71,17 +71,17 @@ fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
 fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: &str, random: &mut Random) -> u64 {
     let look = Look::default();
     let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_manner(technique.manner());
+    let plan = plan.with_requirements(technique.pipeline_requirements());
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     let start = aslant(field, [160, 100], *random.one_of(&[1.0, 2.0, 8.0]));
-    let mut stage = scene.stage(technique, start.size).unwrap();
+    let mut renderer = scene.renderer(technique, start.size).unwrap();
     let made = gpu.device_bytes().values().sum();
     let mut view = start;
     for frame in 0..FRAMES {
-        stage.draw(technique, &view, Copy::Nothing).unwrap();
-        let (size, limits) = (stage.list.size(), technique.limits());
+        renderer.draw(technique, &view, Copy::Nothing).unwrap();
+        let (size, limits) = (renderer.list.size(), technique.limits());
         assert!(limits.hold(&size), "{name}, frame {frame}: {size:?} exceeds {limits:?}");
-        let figure = |name: &str| technique.figures().into_iter().find(|f| f.0 == name).map(|f| f.1);
+        let figure = |name: &str| technique.stats().into_iter().find(|f| f.0 == name).map(|f| f.1);
         assert_eq!(figure("chunks in use"), figure("tiles"), "{name}, frame {frame}: a chunk a tile");
         view = next(field, &start, &view, random);
     }

@@ -69,13 +69,13 @@ fn undeclared_nodata_is_named() {
     }
     // A single spike, a plain beside a hill, and a slope are land.
     let file = TiffFile::new([9, 9], 16, 2);
-    let lands: [fn(usize, usize) -> f64; 3] = [
+    let terrains: [fn(usize, usize) -> f64; 3] = [
         |i, j| if i == 3 && j == 3 { -9999.0 } else { (i + j) as f64 },
         |i, j| if i < 4 { 0.0 } else { (100 + 30 * i + j) as f64 },
         |i, _| i as f64 * 100.0,
     ];
-    for land in lands {
-        assert_eq!(load(&file, land, &Options::default()).warnings, Vec::<String>::new());
+    for terrain in terrains {
+        assert_eq!(load(&file, terrain, &Options::default()).warnings, Vec::<String>::new());
     }
 }
 

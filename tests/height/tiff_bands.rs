@@ -103,12 +103,12 @@ fn internal_masks() {
     for (bits, on) in [(1, 1.0), (8, 255.0)] {
         for file in layouts(&TiffFile::new(SIZE, 32, 3)) {
             let mut bytes = TiffFile { planar: false, ..file.clone() }.bytes(|i, j| value(i, j, 0));
-            let further = |kind: u64, size: [usize; 2], bits: u16, format: u16| {
+            let second_target = |kind: u64, size: [usize; 2], bits: u16, format: u16| {
                 TiffFile { planar: false, size, bits, format, ..file.clone() }.tag(254, Tag::Long(vec![kind]))
             };
             let clear = |i: usize, j: usize| if (4..8).contains(&i) && j < 3 { 0.0 } else { on };
             for (kind, size, bits, format) in [(1, [19, 12], 32, 3), (5, [19, 12], bits, 1), (4, SIZE, bits, 1)] {
-                let next = TiffFile { base: bytes.len(), ..further(kind, size, bits, format) };
+                let next = TiffFile { base: bytes.len(), ..second_target(kind, size, bits, format) };
                 let next = next.bytes(|i, j| if kind == 4 { clear(i, j) } else { 0.0 });
                 bytes = chained(&bytes, &next);
             }

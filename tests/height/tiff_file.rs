@@ -266,7 +266,7 @@ pub fn chained(first: &[u8], next: &[u8]) -> Vec<u8> {
                 bytes[at..at + 4].copy_from_slice(&pointer.to_le_bytes());
                 return bytes;
             }
-            further => end = further as usize,
+            second_target => end = second_target as usize,
         }
     }
 }

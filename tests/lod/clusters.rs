@@ -26,7 +26,7 @@ fn random(seed: &mut u64) -> f64 {
 }
 
 /// Land whose roughness changes from square to square, with holes or without.
-fn land(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
+fn terrain(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
     let count = (size[0] * size[1]) as usize;
     let roughness: Vec<f64> = (0..32 * 32).map(|_| 100.0 * random(seed).powi(12)).collect();
     let square = 6 + (40.0 * random(seed)) as usize;
@@ -82,7 +82,7 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
     let mut seed = 11;
     let (mut blocks, mut clusters, mut kinds, mut closest) = (0, 0, BTreeSet::new(), 0.0f64);
     for k in 0..60 {
-        let field = land(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129], [17, 17]][k % 5]);
+        let field = terrain(&mut seed, [[97, 81], [130, 65], [70, 133], [129, 129], [17, 17]][k % 5]);
         let seams = if k < 50 { "seams=stitched" } else { "seams=skirts" };
         let settings = ["block=8", ["morph=off", "morph=on", "morph=distance"][k / 2 % 3], seams];
         let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
@@ -101,7 +101,8 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
                 kinds.extend(list.draws.iter().map(|draw| draw.indices.start));
             }
             for (mode, list) in modes.iter().zip([&list, &each, &single]) {
-                let proof = watertight::prove_list(&field, &view, mode.manner().seams, mode.resident(), list);
+                let proof =
+                    watertight::prove_list(&field, &view, mode.pipeline_requirements().seams, mode.resident(), list);
                 proof.unwrap_or_else(|why| panic!("{settings:?}: {why}"));
             }
             let errors = geometric::errors(&field, &view, modes[0].resident(), &list);
@@ -253,8 +254,8 @@ fn where_no_certified_tolerance_fits_the_papers_metric_decides() {
         let mut technique = technique(&field, name, settings);
         let mut list = DrawList::default();
         technique.select(&view, &mut list);
-        println!("{name} {settings:?}: {} times as wide, {} triangles", list.widening, list.triangles());
+        println!("{name} {settings:?}: {} times as wide, {} triangles", list.tolerance_scale, list.triangles());
         assert!(technique.limits().hold(&list.size()), "{name} {settings:?}");
-        assert!(list.widening == f64::INFINITY && list.triangles() > 100, "{name} {settings:?}");
+        assert!(list.tolerance_scale == f64::INFINITY && list.triangles() > 100, "{name} {settings:?}");
     }
 }

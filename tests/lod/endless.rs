@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 
 const TOLERANCE_PX: f64 = 8.0;
 
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))))
 }
 
@@ -38,7 +38,7 @@ fn view(field: &Field, above_m: f64, yaw: f64) -> View {
 fn selected(technique: &mut dyn Technique, view: &View) -> DrawList {
     let mut list = DrawList::default();
     technique.select(view, &mut list);
-    assert_eq!(list.widening, 1.0);
+    assert_eq!(list.tolerance_scale, 1.0);
     assert!(technique.limits().hold(&list.size()));
     assert_eq!(list.streamed.normals.len(), list.streamed.vertices.len());
     list
@@ -68,9 +68,9 @@ fn zoom() -> impl Iterator<Item = f64> {
 }
 
 #[test]
-fn the_tolerance_is_kept_against_the_land_itself_from_space_to_a_stone() {
-    let field = land();
-    let bezier = Arc::clone(field.land().expect("endless"));
+fn the_tolerance_is_kept_against_the_terrain_itself_from_space_to_a_stone() {
+    let field = terrain();
+    let bezier = Arc::clone(field.procedural().expect("endless"));
     for morph in ["morph=off", "morph=on"] {
         let mut room = super::technique(&field, "sphere-tree", &[morph]);
         let mut dice = fastrand::Rng::with_seed(3);
@@ -86,7 +86,7 @@ fn the_tolerance_is_kept_against_the_land_itself_from_space_to_a_stone() {
 }
 
 /// The largest error at random places of triangles in the picture, pixels, and the number of places.
-fn worst_px(land: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut fastrand::Rng) -> (f64, usize) {
+fn worst_px(terrain: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut fastrand::Rng) -> (f64, usize) {
     let (mut worst, mut seen) = (0.0f64, 0);
     for &[a, b, c] in triangles {
         for _ in 0..6 {
@@ -95,7 +95,7 @@ fn worst_px(land: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut fas
                 (u, v) = (1.0 - u, 1.0 - v);
             }
             let drawn = a + (b - a) * u + (c - a) * v;
-            let truth = DVec3::new(drawn.x, land.height([drawn.x, drawn.z]), drawn.z);
+            let truth = DVec3::new(drawn.x, terrain.height([drawn.x, drawn.z]), drawn.z);
             if [drawn, truth].iter().any(|&at| view.project(at).is_some_and(|at| view.in_picture(&at))) {
                 worst = worst.max(view.displacement_px(drawn, truth));
                 seen += 1;
@@ -109,8 +109,8 @@ fn worst_px(land: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut fas
 /// pixels: they are relative to the eye's.
 #[test]
 fn the_tolerance_is_kept_nearer_than_single_precision_of_heights() {
-    let field = land();
-    let bezier = Arc::clone(field.land().expect("endless"));
+    let field = terrain();
+    let bezier = Arc::clone(field.procedural().expect("endless"));
     for morph in ["morph=off", "morph=on"] {
         let mut technique = super::technique(&field, "sphere-tree", &[morph]);
         let mut dice = fastrand::Rng::with_seed(3);
@@ -129,7 +129,7 @@ fn the_tolerance_is_kept_nearer_than_single_precision_of_heights() {
 /// No vertex lies within a side of a triangle, and all land in the picture is drawn.
 #[test]
 fn the_mesh_conforms_and_covers_what_is_in_sight() {
-    let field = land();
+    let field = terrain();
     let mut room = super::technique(&field, "sphere-tree", &[]);
     let mut dice = fastrand::Rng::with_seed(5);
     for above_m in zoom() {
@@ -167,7 +167,7 @@ fn covers(triangle: &Drawn, at: DVec2) -> bool {
 
 #[test]
 fn crossings_are_found_alike_and_returning_draws_the_same() {
-    let field = land();
+    let field = terrain();
     let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
     let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion]));
     let mut dice = fastrand::Rng::with_seed(8);

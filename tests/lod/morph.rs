@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::{heights, technique};
 
 /// Mountains of whole blocks: what sticks out does not morph inside.
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 5);
     field.spacing = [20.0, 20.0];
     Arc::new(field)
@@ -33,10 +33,10 @@ fn view(eye: DVec3, target: DVec3, px: f64) -> View {
 /// A block of 16 cells at a level, its sides as far beyond the level as said.
 fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph: [f32; 4]) -> DrawList {
     let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
-    let turns = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
+    let rotation = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
     let weight = |w: f32| (w * ONE as f32) as u32;
     let weights = weights::uniform(weight(morph), edge_morph.map(weight));
-    let instance = Instance { origin, cells: 16, turns, level, weights, ..Instance::default() };
+    let instance = Instance { origin, cells: 16, rotation, level, weights, ..Instance::default() };
     let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
     let draws = ranges.map(|indices| Draw {
         source: Source::Lattice,
@@ -50,7 +50,7 @@ fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph:
 
 #[test]
 fn at_its_end_a_morph_is_the_next_level() {
-    let (field, mesh) = (land(), BlockMesh::new(16, Masks::Sixteen));
+    let (field, mesh) = (terrain(), BlockMesh::new(16, Masks::Sixteen));
     let anywhere = view(DVec3::ZERO, DVec3::X, 1.0);
     let surface = |list: &DrawList| heights(&field, &anywhere, &mesh.geometry, list);
     for origin in [[0, 0], [16, 0], [32, 48], [80, 128]] {
@@ -104,7 +104,7 @@ const JUMP_PX: f64 = 0.15;
 
 #[test]
 fn on_a_slow_way_nothing_jumps() {
-    let field = land();
+    let field = terrain();
     for distance in ["error", "linear", "exponential"] {
         let settings = ["block=17", "base=60", &format!("distance={distance}"), "morph=off"];
         let off = largest_jump(&field, "geomipmap", &settings);
@@ -117,7 +117,7 @@ fn on_a_slow_way_nothing_jumps() {
 
 #[test]
 fn clusters_do_not_jump_either() {
-    let field = land();
+    let field = terrain();
     for (block, seams) in [("block=8", "stitched"), ("block=16", "stitched"), ("block=8", "skirts")] {
         let seams = format!("seams={seams}");
         let [off, on] =
@@ -134,7 +134,7 @@ fn clusters_do_not_jump_either() {
 
 #[test]
 fn nor_do_smooth_tiles() {
-    let field = land();
+    let field = terrain();
     for clock in ["clock=speed", "clock=time", "clock=frames"] {
         let [off, on] =
             ["morph=off", "morph=on"].map(|morph| largest_jump(&field, "smooth-tiles", &["tile=17", morph, clock]));

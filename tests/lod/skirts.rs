@@ -57,11 +57,11 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
     let frame = Frame::placing(&field, &view);
     let states = [[1, 2, 2, 1], [2, 1, 1, 2]];
     let mesh = Mesh::new(n, &states, Seams::Skirts);
-    let (mut compared, mut hung) = (0, 0);
-    for (k, turns) in (0..2).flat_map(|k| (0..4).map(move |turns| (k, turns))) {
+    let (mut compared, mut skirt_vertex) = (0, 0);
+    for (k, rotation) in (0..2).flat_map(|k| (0..4).map(move |rotation| (k, rotation))) {
         // The quadrants after the turn, and how far each has gone over into the next coarser level.
-        let state = cuesta::lod::clusters::states::turned(states[k], turns);
-        let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * turns) % ONE);
+        let state = cuesta::lod::clusters::states::turned(states[k], rotation);
+        let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * rotation) % ONE);
         let mut weights = [0; 4];
         for quadrant in 0..4 {
             let finer = if state[quadrant] == 2 { FINER } else { 0 };
@@ -69,11 +69,12 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
         }
         skirts::set(&mut weights, 0x9c35, 2.5);
         let cells = skirts::cells(2 * n as u32);
-        let instance = Instance { origin: [32, 0], cells, shift: 0, turns, level: 1, weights, ..Instance::default() };
+        let instance =
+            Instance { origin: [32, 0], cells, shift: 0, rotation, level: 1, weights, ..Instance::default() };
         for &index in &mesh.geometry.indices[mesh.ranges[k].start as usize..mesh.ranges[k].end as usize] {
             let position = mesh.geometry.lattice[index as usize].position;
             let found = placed(&field, &frame, &instance, position);
-            let vertex = skirts::hung(&instance, cuesta::draw::place::turned_position(&instance, position));
+            let vertex = skirts::skirt_vertex(&instance, cuesta::draw::place::turned_position(&instance, position));
             let left = 1.0 - f64::from(gone[vertex.quadrant]) / f64::from(ONE);
             // From low to normal resolution, or from normal to double.
             let alpha = if state[vertex.quadrant] == 1 { 0.5 * left } else { 0.5 + 0.5 * left };
@@ -83,8 +84,8 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
             assert!((f64::from(found.height) - expected).abs() < 1e-2, "{found:?}: {expected} m, {vertex:?}");
             assert_eq!(found.level & SKIRT != 0, vertex.side.is_some());
             compared += 1;
-            hung += u32::from(is_set);
+            skirt_vertex += u32::from(is_set);
         }
     }
-    assert!(compared > 10_000 && hung > 500, "{compared} vertices, {hung} of skirts");
+    assert!(compared > 10_000 && skirt_vertex > 500, "{compared} vertices, {skirt_vertex} of skirts");
 }

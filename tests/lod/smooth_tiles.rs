@@ -86,7 +86,7 @@ fn next(field: &Field, random: &mut Random, [before, last]: [&View; 2]) -> View 
 struct Seen {
     frames: AtomicU64,
     morphing: AtomicU64,
-    waiting: AtomicU64,
+    pending: AtomicU64,
     stitched: AtomicU64,
 }
 
@@ -96,7 +96,7 @@ impl Seen {
         let is_between = |weight: u32| weight > 0 && weight < ONE;
         let morphing = list.instances.iter().any(|tile| is_between(get(tile, inside(0))));
         self.morphing.fetch_add(u64::from(morphing), Relaxed);
-        self.waiting.fetch_add(u64::from(list.waiting > 0), Relaxed);
+        self.pending.fetch_add(u64::from(list.pending > 0), Relaxed);
         self.stitched.fetch_add(u64::from(list.levels().iter().filter(|&&n| n > 0).count() > 1), Relaxed);
     }
 }
@@ -106,9 +106,10 @@ fn check(flight: &str, field: &Field, technique: &mut dyn Technique, views: &[Vi
     for (frame, view) in views.iter().enumerate() {
         let mut list = DrawList::default();
         technique.select(view, &mut list);
-        let proof = watertight::prove_list(field, view, technique.manner().seams, technique.resident(), &list);
+        let proof =
+            watertight::prove_list(field, view, technique.pipeline_requirements().seams, technique.resident(), &list);
         proof.unwrap_or_else(|why| panic!("{flight}, frame {frame}: {why}"));
-        if list.waiting == 0 && measures {
+        if list.pending == 0 && measures {
             let max_px = geometric::errors(field, view, technique.resident(), &list).screen_px.max;
             let px = view.tolerance.px;
             assert!(max_px <= px * (1.0 + 1e-9), "{flight}, frame {frame}: {max_px} px of {px}");
@@ -135,12 +136,12 @@ fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
         }
         check(&format!("script {script}"), field, &mut *technique, &views, script.is_multiple_of(4), &seen);
     });
-    let [frames, morphing, waiting, stitched] =
-        [seen.frames, seen.morphing, seen.waiting, seen.stitched].map(AtomicU64::into_inner);
+    let [frames, morphing, pending, stitched] =
+        [seen.frames, seen.morphing, seen.pending, seen.stitched].map(AtomicU64::into_inner);
     println!(
-        "{frames} frames, {morphing} in mid-morph, {stitched} of several levels, {waiting} with something waiting"
+        "{frames} frames, {morphing} in mid-morph, {stitched} of several levels, {pending} with something waiting"
     );
-    assert!(morphing > frames / 20 && waiting > frames / 20 && stitched > frames / 20, "all of it occurs");
+    assert!(morphing > frames / 20 && pending > frames / 20 && stitched > frames / 20, "all of it occurs");
 }
 
 #[test]
@@ -159,9 +160,9 @@ fn every_frame_of_every_path_is_one_surface_within_the_tolerance() {
             let mut technique = technique(field, "smooth-tiles", &[tile, clock, rebuild]);
             check(&format!("{}, {clock}, {rebuild}", path.name), field, &mut *technique, &views, true, &seen);
         });
-        let [frames, morphing, waiting] = [&seen.frames, &seen.morphing, &seen.waiting].map(|n| n.load(Relaxed));
-        println!("{rebuild}: {frames} frames, {morphing} in mid-morph, {waiting} with something waiting");
-        assert!(morphing > frames / 20 && (waiting > 0) == waits, "{rebuild}: {morphing}, {waiting} of {frames}");
+        let [frames, morphing, pending] = [&seen.frames, &seen.morphing, &seen.pending].map(|n| n.load(Relaxed));
+        println!("{rebuild}: {frames} frames, {morphing} in mid-morph, {pending} with something waiting");
+        assert!(morphing > frames / 20 && (pending > 0) == waits, "{rebuild}: {morphing}, {pending} of {frames}");
     }
 }
 
@@ -174,7 +175,7 @@ fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Tr
         let mut list = DrawList::default();
         technique.select(&View { time_s: view.time_s + f64::from(frame), ..*view }, &mut list);
         if technique.is_settled() {
-            assert_eq!(list.waiting, 0, "nothing waits any more");
+            assert_eq!(list.pending, 0, "nothing waits any more");
             let frame_data = Frame::placing(field, view);
             let drawn = expand::triangles(field, &frame_data, technique.resident(), &list);
             let mut triangles: Vec<Triangle> =
@@ -187,7 +188,7 @@ fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Tr
 }
 
 #[test]
-fn one_chunk_a_frame_comes_to_the_same_land_as_all_at_once() {
+fn one_chunk_a_frame_comes_to_the_same_terrain_as_all_at_once() {
     let random = &mut Random(7);
     let mut longest = 0;
     for field in fields() {
@@ -221,7 +222,7 @@ fn settled_list(technique: &mut dyn Technique, view: &View) -> DrawList {
 #[test]
 fn a_full_buffer_widens_the_tolerance() {
     let field = Arc::new(synth::synth(synth::Kind::Eroded, [257, 257], 5));
-    let (random, mut frames, mut widened) = (&mut Random(11), 0, 0);
+    let (random, mut frames, mut select_within_limits) = (&mut Random(11), 0, 0);
     for settings in [
         ["morph=on", "clock=speed"],
         ["morph=on", "clock=time"],
@@ -233,16 +234,18 @@ fn a_full_buffer_widens_the_tolerance() {
         for k in 0..100 {
             let view = view(&field, random, 1e6 * f64::from(k));
             let list = settled_list(&mut *technique, &view);
-            assert_eq!(list.waiting, 0, "{settings:?}, view {k}");
-            watertight::prove_list(&field, &view, technique.manner().seams, technique.resident(), &list).unwrap();
+            assert_eq!(list.pending, 0, "{settings:?}, view {k}");
+            watertight::prove_list(&field, &view, technique.pipeline_requirements().seams, technique.resident(), &list)
+                .unwrap();
             let max_px = geometric::errors(&field, &view, technique.resident(), &list).screen_px.max;
-            let px = view.tolerance.px * list.widening;
+            let px = view.tolerance.px * list.tolerance_scale;
             assert!(max_px <= px * (1.0 + 1e-9), "{settings:?}, view {k}: {max_px} px of {px}");
-            (frames, widened) = (frames + 1, widened + usize::from(list.widening > 1.0));
+            (frames, select_within_limits) =
+                (frames + 1, select_within_limits + usize::from(list.tolerance_scale > 1.0));
         }
     }
-    println!("{widened} of {frames} views under a wider tolerance");
-    assert!(widened > frames / 20 && widened < frames - frames / 20);
+    println!("{select_within_limits} of {frames} views under a wider tolerance");
+    assert!(select_within_limits > frames / 20 && select_within_limits < frames - frames / 20);
 }
 
 /// Frames of a way along which tiles only coarsen: the bound never hurries them.
@@ -299,19 +302,19 @@ fn beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -
 #[test]
 fn nothing_moves_further_in_a_frame_than_the_clock_says() {
     for drive in ["speed", "time", "frames"] {
-        let (clock, mut most, mut leap) = (format!("clock={drive}"), 0.0f64, f64::MIN);
+        let (clock, mut max, mut leap) = (format!("clock={drive}"), 0.0f64, f64::MIN);
         // Tiles that stick out of a field do not morph inside: the last one has some.
         for field in &fields()[..3] {
             for rebuild in ["rebuild=1", "rebuild=100000"] {
                 let mut morphing = technique(field, "smooth-tiles", &["tile=9", &clock, rebuild]);
                 let [beyond, moved] = beyond_the_clock(field, &mut *morphing, drive);
                 assert!(beyond <= 0.0, "{drive}, {rebuild}: {beyond} of the range beyond the clock");
-                most = most.max(moved);
+                max = max.max(moved);
             }
             let mut at_once = technique(field, "smooth-tiles", &["tile=9", "morph=off"]);
             leap = leap.max(beyond_the_clock(field, &mut *at_once, drive)[0]);
         }
-        println!("{drive}: {most:.4} of the range in a frame at most; at once {leap:.4} beyond the clock");
-        assert!(most > 0.005 && leap > 0.05, "{drive}: it moves, and at once it leaps: {most}, {leap}");
+        println!("{drive}: {max:.4} of the range in a frame at most; at once {leap:.4} beyond the clock");
+        assert!(max > 0.005 && leap > 0.05, "{drive}: it moves, and at once it leaps: {max}, {leap}");
     }
 }

@@ -7,13 +7,13 @@ use cuesta::draw::{DrawList, ExplicitVertex, Geometry, Source, Upload, expand};
 use cuesta::height::progress::Progress;
 use cuesta::height::synth::{self, Kind};
 use cuesta::height::{Field, Holes, Samples};
+use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
 use cuesta::lod::sphere_tree::covers::Covers;
-use cuesta::lod::sphere_tree::front::{Follower, Watch};
+use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
 use cuesta::lod::sphere_tree::lattice::Place;
 use cuesta::lod::sphere_tree::measure::{Known, Measured};
 use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::lod::sphere_tree::roam::Queues;
-use cuesta::lod::sphere_tree::shells::Shells;
 use cuesta::lod::sphere_tree::splits::{Found, Splits};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
@@ -34,7 +34,7 @@ impl Dice {
     }
 }
 
-fn land(size: [u32; 2]) -> Arc<Field> {
+fn terrain(size: [u32; 2]) -> Arc<Field> {
     let mut field = synth::synth(Kind::Fractal, size, 3);
     field.spacing = [10.0, 12.0];
     Arc::new(field)
@@ -105,10 +105,10 @@ fn walk(field: &Field, steps: usize, seed: u64) -> Vec<(DVec3, f64)> {
 /// The set is what it is defined to be: by every sphere alone, without looking at the others.
 #[test]
 fn what_has_split_are_the_spheres_around_the_eye() {
-    for field in [land([100, 140]), noise([40, 33])] {
+    for field in [terrain([100, 140]), noise([40, 33])] {
         let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
         let (all, mut found) = (diamonds(&measured), Found::default());
-        let (mut splits, mut least, mut most) = (Splits::none(&measured), usize::MAX, 0);
+        let (mut splits, mut min, mut max) = (Splits::none(&measured), usize::MAX, 0);
         for (eye, px) in walk(&field, 60, 4) {
             let from = viewpoint(&measured, eye, px);
             assert!(splits.refill(&measured, &from, &mut found, usize::MAX));
@@ -116,13 +116,13 @@ fn what_has_split_are_the_spheres_around_the_eye() {
                 let is_inside = known.centre.distance(from.eye) < from.reach.radius(known);
                 assert_eq!(splits.contains(known.index), is_inside, "{known:?}");
             }
-            (least, most) = (least.min(splits.count()), most.max(splits.count()));
+            (min, max) = (min.min(splits.count()), max.max(splits.count()));
         }
-        assert!(most > 3 * least + 100, "{least} to {most} split");
+        assert!(max > 3 * min + 100, "{min} to {max} split");
     }
 }
 
-fn follows<W: Watch>(field: &Arc<Field>, band: f64, hold: f64, seed: u64) {
+fn follows<W: CrossingTracker>(field: &Arc<Field>, band: f64, hold: f64, seed: u64) {
     let measured = Measured::new(Arc::clone(field), band as f32, &Progress::default());
     let (mut follower, mut found) = (Follower::<W>::new(&measured), Found::default());
     let (mut splits, mut saved) = (Splits::none(&measured), 0);
@@ -141,30 +141,30 @@ fn follows<W: Watch>(field: &Arc<Field>, band: f64, hold: f64, seed: u64) {
 
 #[test]
 fn made_up_spheres_find_the_same_as_all() {
-    follows::<Shells>(&land([100, 140]), 1.0, 1.0, 1);
-    follows::<Shells>(&noise([70, 33]), 1.3, 1.0, 2);
-    follows::<Shells>(&land([129, 129]), 1.0, 1.1, 3);
+    follows::<BoundingSpheres>(&terrain([100, 140]), 1.0, 1.0, 1);
+    follows::<BoundingSpheres>(&noise([70, 33]), 1.3, 1.0, 2);
+    follows::<BoundingSpheres>(&terrain([129, 129]), 1.0, 1.1, 3);
 }
 
 #[test]
 fn spheres_that_cover_others_find_the_same_as_all() {
-    follows::<Covers>(&land([100, 140]), 1.0, 1.0, 1);
+    follows::<Covers>(&terrain([100, 140]), 1.0, 1.0, 1);
     follows::<Covers>(&noise([70, 33]), 1.3, 1.0, 2);
-    follows::<Covers>(&land([129, 129]), 1.0, 1.1, 3);
+    follows::<Covers>(&terrain([129, 129]), 1.0, 1.1, 3);
 }
 
 #[test]
 fn two_queues_find_the_same_as_all() {
-    follows::<Queues>(&land([100, 140]), 1.0, 1.0, 5);
+    follows::<Queues>(&terrain([100, 140]), 1.0, 1.0, 5);
     follows::<Queues>(&noise([70, 33]), 1.3, 1.0, 6);
-    follows::<Queues>(&land([129, 129]), 1.0, 1.1, 7);
+    follows::<Queues>(&terrain([129, 129]), 1.0, 1.1, 7);
 }
 
 #[test]
 fn a_follower_gives_up_beyond_its_limit_and_recovers() {
-    let field = land([100, 140]);
+    let field = terrain([100, 140]);
     let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
-    let (mut follower, mut found) = (Follower::<Shells>::new(&measured), Found::default());
+    let (mut follower, mut found) = (Follower::<BoundingSpheres>::new(&measured), Found::default());
     let mut splits = Splits::none(&measured);
     let views: Vec<_> = walk(&field, 400, 8).iter().map(|&(eye, px)| viewpoint(&measured, eye, px)).collect();
     let count = |from: &Viewpoint| {
@@ -187,7 +187,7 @@ fn a_follower_gives_up_beyond_its_limit_and_recovers() {
 /// Walks a scene once with each criterion: the same lists, to the byte.
 #[test]
 fn the_criteria_draw_the_same() {
-    let field = land([150, 111]);
+    let field = terrain([150, 111]);
     for morph in ["morph=off", "morph=on"] {
         let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
         let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion, morph]));
@@ -281,8 +281,8 @@ fn drawn_on(device: &mut Geometry, field: &Field, view: &View, list: &DrawList) 
 /// Patches on the device, sent when they change: at every step of a walk the triangles that are streamed otherwise.
 #[test]
 fn patches_draw_what_is_streamed_otherwise() {
-    let field = land([300, 260]);
-    for (morph, least_saving) in [("morph=off", 3.0), ("morph=on", 0.9)] {
+    let field = terrain([300, 260]);
+    for (morph, min_saving) in [("morph=off", 3.0), ("morph=on", 0.9)] {
         let mut rooms = ["patches=streamed", "patches=resident"]
             .map(|patches| super::technique(&field, "sphere-tree", &[morph, patches]));
         let mut devices = rooms.each_ref().map(|room| room.resident().clone());
@@ -301,6 +301,6 @@ fn patches_draw_what_is_streamed_otherwise() {
         }
         println!("{morph}: {} B streamed, {} B for patches in {resident_draws} draws", sent[0], sent[1]);
         assert!(resident_draws > 1000);
-        assert!(sent[0] as f64 > least_saving * sent[1] as f64, "{morph}: {sent:?} bytes");
+        assert!(sent[0] as f64 > min_saving * sent[1] as f64, "{morph}: {sent:?} bytes");
     }
 }

@@ -4,10 +4,10 @@ use cuesta::draw::expand::Drawn;
 use cuesta::height::surface::Corner;
 use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::sorted_strips::blend::Blend;
-use cuesta::lod::sorted_strips::pages::{Gaze, Grid, Pages};
+use cuesta::lod::sorted_strips::pages::{Grid, Pages, TraversalDirection};
 use cuesta::lod::sorted_strips::shapes::Shapes;
 use cuesta::lod::sorted_strips::splits::{Levels, Splits};
-use cuesta::lod::sorted_strips::walk::Ground;
+use cuesta::lod::sorted_strips::walk::WalkContext;
 use cuesta::measure::watertight;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
@@ -38,7 +38,7 @@ struct Scene {
     field: Field,
     pages: Pages,
     splits: Splits,
-    gaze: Gaze,
+    traversal: TraversalDirection,
 }
 
 impl Scene {
@@ -67,21 +67,22 @@ impl Scene {
         }
         let eye = size.map(|n| f64::from(n) * (2.0 * dice.share() - 0.5));
         let [ahead, against] = [[dice.sign(), dice.sign()], [dice.sign(), dice.sign()]];
-        let gaze = Gaze { major: dice.below(2) as usize, eye, ahead, against: against.map(|sign| sign < 0) };
-        Self { field, pages, splits, gaze }
+        let traversal =
+            TraversalDirection { major: dice.below(2) as usize, eye, ahead, against: against.map(|sign| sign < 0) };
+        Self { field, pages, splits, traversal }
     }
 
     fn triangles(&self) -> Vec<Drawn> {
         let shapes = Shapes::default();
-        let ground = Ground {
+        let ground = WalkContext {
             field: &self.field,
             pages: &self.pages,
             levels: &self.splits,
             shapes: &shapes,
-            gaze: self.gaze,
+            traversal: self.traversal,
             blend: Blend::Off,
         };
-        let streams = self.pages.rows(&self.gaze).into_iter().map(|row| ground.walk(&row));
+        let streams = self.pages.rows(&self.traversal).into_iter().map(|row| ground.walk(&row));
         streams
             .flat_map(|stream| {
                 let corner = |k: u32| match stream.vertices.get(k as usize) {
@@ -126,7 +127,7 @@ fn ten_thousand_level_functions_give_one_surface_each() {
             let scene = Scene::random(seed, true);
             let triangles = scene.triangles();
             let proof = watertight::prove(&scene.field, &frustum, &triangles)
-                .unwrap_or_else(|why| panic!("seed {seed}, {:?}, {:?}: {why}", scene.pages.grid, scene.gaze));
+                .unwrap_or_else(|why| panic!("seed {seed}, {:?}, {:?}: {why}", scene.pages.grid, scene.traversal));
             assert_eq!(proof.doubled_area, scene.doubled_area(), "seed {seed}");
             (proof.triangles, (1..7).filter(|&l| is_any_split(&scene, l)).count())
         })
@@ -166,11 +167,12 @@ fn is_any_split(scene: &Scene, level: u32) -> bool {
 fn rays_meet_triangles_in_order() {
     let rays = |seed: u64| {
         let mut scene = Scene::random(seed, true);
-        let gaze = scene.gaze;
-        let [met, unsorted] = follow(seed, &scene.triangles(), &gaze);
-        assert_eq!(unsorted, 0, "seed {seed}, {:?}, {gaze:?}", scene.pages.grid);
-        scene.gaze = Gaze { eye: [0, 1].map(|k| 500.0 * f64::from(gaze.ahead[k])), ..gaze };
-        [met, follow(seed, &scene.triangles(), &gaze)[1]]
+        let traversal = scene.traversal;
+        let [met, unsorted] = follow(seed, &scene.triangles(), &traversal);
+        assert_eq!(unsorted, 0, "seed {seed}, {:?}, {traversal:?}", scene.pages.grid);
+        scene.traversal =
+            TraversalDirection { eye: [0, 1].map(|k| 500.0 * f64::from(traversal.ahead[k])), ..traversal };
+        [met, follow(seed, &scene.triangles(), &traversal)[1]]
     };
     let met: Vec<_> = (0..600u64).into_par_iter().map(rays).collect();
     let [met, control] = [0, 1].map(|k| met.iter().map(|met| met[k]).sum::<usize>());
@@ -179,13 +181,13 @@ fn rays_meet_triangles_in_order() {
 }
 
 /// Triangles that rays meet, and rays that do not meet them in order.
-fn follow(seed: u64, triangles: &[Drawn], gaze: &Gaze) -> [usize; 2] {
+fn follow(seed: u64, triangles: &[Drawn], traversal: &TraversalDirection) -> [usize; 2] {
     let mut dice = Dice(seed);
     let mut sums = [0; 2];
     for _ in 0..20 {
-        let least = gaze.against.map(|against| if against { -1.0 } else { 0.0 });
-        let towards = [0, 1].map(|k| f64::from(gaze.ahead[k]) * (least[k] + (1.0 - least[k]) * dice.share()));
-        let in_ray = |(k, t): (usize, &Drawn)| Some((middle_inside(t, gaze.eye, towards)?, k));
+        let min = traversal.against.map(|against| if against { -1.0 } else { 0.0 });
+        let towards = [0, 1].map(|k| f64::from(traversal.ahead[k]) * (min[k] + (1.0 - min[k]) * dice.share()));
+        let in_ray = |(k, t): (usize, &Drawn)| Some((middle_inside(t, traversal.eye, towards)?, k));
         let mut met: Vec<(f64, usize)> = triangles.iter().enumerate().filter_map(in_ray).collect();
         met.sort_by(|a, b| a.0.total_cmp(&b.0));
         sums[0] += met.len();
@@ -230,7 +232,7 @@ fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32)
         };
         let mut list = cuesta::draw::DrawList::default();
         strips.select(&view, &mut list);
-        watertight::prove_list(field, &view, strips.manner().seams, strips.resident(), &list).unwrap();
+        watertight::prove_list(field, &view, strips.pipeline_requirements().seams, strips.resident(), &list).unwrap();
         super::heights(field, &view, strips.resident(), &list)
     };
     (0..steps).map(step).collect()
@@ -282,7 +284,7 @@ fn what_slides_does_so_along_an_edge_between_vertices_that_stand() {
             };
             let mut list = cuesta::draw::DrawList::default();
             strips.select(&view, &mut list);
-            watertight::prove_list(&field, &view, strips.manner().seams, strips.resident(), &list)
+            watertight::prove_list(&field, &view, strips.pipeline_requirements().seams, strips.resident(), &list)
                 .unwrap_or_else(|why| panic!("{edge} {view:?}: {why}"));
             let unit = 1 << list.fraction_bits;
             let at = |v: &cuesta::draw::ExplicitVertex| v.position.map(|n| f64::from(n) / f64::from(unit));

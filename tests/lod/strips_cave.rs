@@ -52,7 +52,7 @@ fn strips(cave: &Arc<Cave>, settings: &[(&str, &str)]) -> CaveStrips {
 fn drawn(cave: &Cave, strips: &mut CaveStrips, view: &View) -> Vec<Drawn> {
     let mut list = DrawList::default();
     strips.select(view, &mut list);
-    assert!(strips.limits().hold(&list.size()) && list.widening == 1.0);
+    assert!(strips.limits().hold(&list.size()) && list.tolerance_scale == 1.0);
     expand::triangles(cave.floor(), &Frame::placing(cave.floor(), view), strips.resident(), &list)
 }
 

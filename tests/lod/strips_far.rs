@@ -10,7 +10,7 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::technique;
 
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     let mut field = synth::synth(synth::Kind::Fractal, [1025, 1025], 7);
     field.spacing = [10.0, 10.0];
     Arc::new(field)
@@ -35,8 +35,8 @@ fn select(strips: &mut dyn Technique, view: &View) -> DrawList {
 }
 
 #[test]
-fn land_is_drawn_as_far_as_the_list_says() {
-    let field = land();
+fn terrain_is_drawn_as_far_as_the_list_says() {
+    let field = terrain();
     for level in ["level=certified", "level=uniform"] {
         let mut strips = technique(&field, "sorted-strips", &[level, "page=16", "far=4"]);
         let mut whole = technique(&field, "sorted-strips", &[level, "page=16"]);
@@ -45,8 +45,9 @@ fn land_is_drawn_as_far_as_the_list_says() {
             let (mut list, all) = (select(&mut *strips, &view), select(&mut *whole, &view));
             assert!((list.reach_m - 4.0 * (above_m + 160.0)).abs() < 1e-6, "{} m", list.reach_m);
             assert!(all.reach_m.is_infinite() && 10 * list.triangles() < 9 * all.triangles(), "{above_m} m");
-            let prove =
-                |list: &DrawList| watertight::prove_list(&field, &view, strips.manner().seams, strips.resident(), list);
+            let prove = |list: &DrawList| {
+                watertight::prove_list(&field, &view, strips.pipeline_requirements().seams, strips.resident(), list)
+            };
             prove(&list).unwrap_or_else(|why| panic!("{level} {above_m} m: {why}"));
             // A list that said that it reaches further would be found out.
             list.reach_m *= 2.0;
@@ -56,8 +57,8 @@ fn land_is_drawn_as_far_as_the_list_says() {
 }
 
 #[test]
-fn lower_down_there_is_less_land() {
-    let field = land();
+fn lower_down_there_is_less_terrain() {
+    let field = terrain();
     let load = |far: &str| {
         let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=8", "page=16", far]);
         [1000.0, 250.0, 60.0, 15.0].map(|above_m| select(&mut *strips, &view(&field, above_m)).triangles())

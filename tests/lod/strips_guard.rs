@@ -43,12 +43,12 @@ fn turned(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
 #[test]
 fn a_turn_of_the_head_brings_nothing_coarse_into_sight() {
     let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
-    let (open_px, least) = turned("guard=0", lens, 8.0);
-    let (kept_px, most) = turned("guard=0.25", lens, 8.0);
-    println!("jumps of {open_px} px without a band and {kept_px} px with it, {least} and {most} triangles");
+    let (open_px, min) = turned("guard=0", lens, 8.0);
+    let (kept_px, max) = turned("guard=0.25", lens, 8.0);
+    println!("jumps of {open_px} px without a band and {kept_px} px with it, {min} and {max} triangles");
     // Both lists are within the tolerance, each in its own view.
     assert!(kept_px <= 3.0 * TOLERANCE.px && open_px > 5.0 * TOLERANCE.px, "{kept_px} {open_px}");
-    assert!(most < 2 * least, "the band is no second picture: {most} of {least}");
+    assert!(max < 2 * min, "the band is no second picture: {max} of {min}");
 }
 
 #[test]

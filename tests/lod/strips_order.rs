@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cuesta::bench::paths;
 use cuesta::draw::expand::{self, Drawn};
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, Geometry, Hiding};
+use cuesta::draw::{DepthMode, DrawList, Geometry};
 use cuesta::height::{Field, surface, synth};
 use cuesta::lod::Technique;
 use cuesta::measure::watertight;
@@ -23,7 +23,7 @@ pub(super) const SIZE: [u32; 2] = [48, 32];
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Met {
     /// Pixels with land.
-    land: usize,
+    terrain: usize,
     /// Pixels whose ray meets several triangles.
     pub(super) several: usize,
     /// Of these, those whose triangles do not come nearest first.
@@ -35,8 +35,8 @@ pub(super) struct Met {
 impl Met {
     fn plus(self, other: Met) -> Met {
         let [a, b] = [self, other];
-        let (land, several) = (a.land + b.land, a.several + b.several);
-        Met { land, several, unsorted: a.unsorted + b.unsorted, wrong: a.wrong + b.wrong }
+        let (terrain, several) = (a.terrain + b.terrain, a.several + b.several);
+        Met { terrain, several, unsorted: a.unsorted + b.unsorted, wrong: a.wrong + b.wrong }
     }
 }
 
@@ -97,7 +97,7 @@ fn follow_between(field: &Field, view: &View, triangles: &[Drawn], fraction_bits
         let slack = 1e-9 * nearest.abs();
         let unsorted = met.windows(2).any(|pair| pair[0] > pair[1] + slack);
         let wrong = met[0] > nearest + slack;
-        Met { land: 1, several: usize::from(met.len() > 1), unsorted: unsorted.into(), wrong: wrong.into() }
+        Met { terrain: 1, several: usize::from(met.len() > 1), unsorted: unsorted.into(), wrong: wrong.into() }
     };
     pixels.map(of_pixel).reduce(Met::default, Met::plus)
 }
@@ -107,7 +107,7 @@ fn view(eye: DVec3, rotation: glam::DMat3, lens: Lens) -> View {
     View { eye, world_from_eye: rotation, lens, size: SIZE, near: 1.0, tolerance, time_s: 0.0 }
 }
 
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     let mut field = synth::synth(synth::Kind::Fractal, [201, 170], 3);
     field.spacing = [20.0, 20.0];
     Arc::new(field)
@@ -145,7 +145,7 @@ fn met(field: &Arc<Field>, views: &[View], settings: &[&str]) -> Met {
     let mut strips = technique(field, "sorted-strips", settings);
     let of_view = |view: &View| {
         let list = list(strips.as_mut(), view);
-        watertight::prove_list(field, view, strips.manner().seams, strips.resident(), &list).unwrap();
+        watertight::prove_list(field, view, strips.pipeline_requirements().seams, strips.resident(), &list).unwrap();
         follow_between(field, view, &triangles(field, view, &list), list.fraction_bits)
     };
     views.iter().map(of_view).fold(Met::default(), Met::plus)
@@ -153,7 +153,7 @@ fn met(field: &Arc<Field>, views: &[View], settings: &[&str]) -> Met {
 
 #[test]
 fn from_outside_every_ray_meets_triangles_in_order() {
-    let field = land();
+    let field = terrain();
     for settings in [["level=certified", "page=16"], ["level=certified", "page=64"], ["level=uniform", "page=64"]] {
         let met = met(&field, &from_outside(&field), &settings);
         println!("{settings:?}: {met:?}");
@@ -164,7 +164,7 @@ fn from_outside_every_ray_meets_triangles_in_order() {
 
 #[test]
 fn from_inside_every_ray_meets_triangles_in_order() {
-    let field = land();
+    let field = terrain();
     for settings in [["level=certified", "page=16"], ["level=certified", "page=64"], ["level=uniform", "page=64"]] {
         let met = met(&field, &from_inside(&field), &settings);
         println!("{settings:?}: {met:?}");
@@ -176,7 +176,7 @@ fn from_inside_every_ray_meets_triangles_in_order() {
 /// Every named path: along each ray triangles in order, so a painter without a depth buffer draws no pixel wrong.
 #[test]
 fn on_every_named_path_every_ray_meets_triangles_in_order() {
-    let field = land();
+    let field = terrain();
     let tolerance = Tolerance { px: 0.7, metric: Metric::Certified };
     let views =
         |path: &paths::Path| path.views(&field, 200, SIZE, tolerance).into_iter().step_by(19).collect::<Vec<_>>();
@@ -185,7 +185,7 @@ fn on_every_named_path_every_ray_meets_triangles_in_order() {
         for path in paths::PATHS {
             let met = met(&field, &views(path), &settings);
             println!("{settings:?} {}: {met:?}", path.name);
-            assert!(met.land > 0 && (met.unsorted, met.wrong) == (0, 0), "{settings:?} {}: {met:?}", path.name);
+            assert!(met.terrain > 0 && (met.unsorted, met.wrong) == (0, 0), "{settings:?} {}: {met:?}", path.name);
             all = all.plus(met);
         }
         assert!(all.several > 1000, "rays meet several triangles: {all:?}");
@@ -196,23 +196,26 @@ fn on_every_named_path_every_ray_meets_triangles_in_order() {
 /// rays suffers.
 #[test]
 fn where_vertices_slide_few_rays_meet_triangles_out_of_order() {
-    let field = land();
+    let field = terrain();
     let views = [from_outside(&field), from_inside(&field)].concat();
     let [still, sliding] =
         ["blend=height", "blend=end"].map(|blend| met(&field, &views, &["level=uniform", "edge=8", "page=64", blend]));
     println!("{still:?} {sliding:?}");
     assert_eq!((still.unsorted, still.wrong), (0, 0));
-    assert!(sliding.several > 500 && sliding.wrong > 0 && 50 * sliding.wrong < sliding.land, "{sliding:?}");
+    assert!(sliding.several > 500 && sliding.wrong > 0 && 50 * sliding.wrong < sliding.terrain, "{sliding:?}");
     // So a painter would not do.
-    let hiding =
-        |blend: &str| technique(&field, "sorted-strips", &["level=uniform", "order=painter", blend]).manner().hiding;
-    assert_eq!(["blend=height", "blend=end"].map(hiding), [Hiding::ByOrder, Hiding::ByDepth]);
+    let depth_mode = |blend: &str| {
+        technique(&field, "sorted-strips", &["level=uniform", "order=painter", blend])
+            .pipeline_requirements()
+            .depth_mode
+    };
+    assert_eq!(["blend=height", "blend=end"].map(depth_mode), [DepthMode::Painter, DepthMode::Buffer]);
 }
 
 /// The list as it is, and turned round: the same triangles, the last one first.
 #[test]
 fn back_to_front_is_the_same_list_turned_round() {
-    let field = land();
+    let field = terrain();
     for view in from_inside(&field).iter().step_by(3) {
         let [front, mut back] = ["order=front", "order=back"]
             .map(|order| drawn(&field, technique(&field, "sorted-strips", &[order]).as_mut(), view));
@@ -226,7 +229,7 @@ fn back_to_front_is_the_same_list_turned_round() {
 
 #[test]
 fn on_one_core_the_list_is_the_same() {
-    let field = land();
+    let field = terrain();
     let (mut rows, mut parallel_rows) = (0, 0);
     for level in ["level=certified", "level=uniform"] {
         for view in from_inside(&field) {

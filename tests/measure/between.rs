@@ -12,7 +12,7 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::{drawn, select, technique};
 
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     let mut field = synth::synth(synth::Kind::Fractal, [201, 170], 3);
     field.spacing = [20.0, 20.0];
     Arc::new(field)
@@ -41,7 +41,7 @@ fn in_parts(list: &DrawList) -> DrawList {
 
 #[test]
 fn told_in_parts_of_samples_the_same_list_measures_the_same() {
-    let field = land();
+    let field = terrain();
     let views = [8.0, 9.0].map(|x| view(&field, x));
     let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10")]);
     let lists = views.each_ref().map(|view| select(&mut *strips, view));
@@ -60,7 +60,9 @@ fn told_in_parts_of_samples_the_same_list_measures_the_same() {
         [&lists, &finer].map(|lists| economy::economy(&field, &views[1], resident, &lists[1], &depth));
     assert_eq!(sizes, sizes_finer);
     let [proof, proof_finer] = [&lists, &finer].map(|lists| {
-        let proof = watertight::prove_list(&field, &views[1], strips.manner().seams, resident, &lists[1]).unwrap();
+        let proof =
+            watertight::prove_list(&field, &views[1], strips.pipeline_requirements().seams, resident, &lists[1])
+                .unwrap();
         (proof.triangles, proof.doubled_area)
     });
     assert_eq!(proof, proof_finer);
@@ -73,7 +75,7 @@ fn corner_at(triangle: &Drawn, at: [i32; 2]) -> Option<usize> {
 
 #[test]
 fn faults_of_parts_of_a_sample_are_found() {
-    let field = land();
+    let field = terrain();
     let view = view(&field, 8.0);
     let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10"), ("blend", "end")]);
     let list = select(&mut *strips, &view);
@@ -114,7 +116,7 @@ fn faults_of_parts_of_a_sample_are_found() {
 
 #[test]
 fn a_junction_between_samples_is_found() {
-    let field = land();
+    let field = terrain();
     let view = view(&field, 8.0);
     let corner = |x: i32, z: i32| cuesta::height::surface::Corner { x, z, y: 1.0 };
     let [last_x, last_z] = field.size().map(|n| (n as i32 - 1) << 6);

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::{drawn, select, technique};
 
-fn land() -> Arc<Field> {
+fn terrain() -> Arc<Field> {
     let mut field = synth::synth(Kind::Fractal, [129, 129], 5);
     field.spacing = [20.0, 20.0];
     Arc::new(field)
@@ -46,7 +46,7 @@ fn heights(triangles: &[Drawn]) -> HashMap<[u32; 2], f64> {
 
 /// What the meter finds from frame to frame, and the largest displacement by hand.
 fn journey(settings: &[(&str, &str)]) -> Vec<(Pop, f64)> {
-    let field = land();
+    let field = terrain();
     let mut technique = technique(&field, "geomipmap", settings);
     let lists: Vec<_> = (0..40).map(|k| select(&mut *technique, &view(&field, k))).collect();
     let pair = |k: usize| {
@@ -80,7 +80,7 @@ fn jumps_are_those_found_by_hand_and_morphing_has_fewer() {
 /// A list from before may be expanded in a later view: instances hold positions of the lattice, not of the eye.
 #[test]
 fn an_expanded_list_is_the_same_in_every_view() {
-    let field = land();
+    let field = terrain();
     let mut technique = technique(&field, "geomipmap", &[("morph", "on")]);
     let list = select(&mut *technique, &view(&field, 3));
     let corners = |k: u32| -> Vec<_> {

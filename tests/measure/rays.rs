@@ -148,7 +148,7 @@ fn agree(what: &str, summary: Summary, values: impl Iterator<Item = f64>) {
 fn compare(name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
     let (field, mut random) = (Arc::new(rough_field()), Random(99));
     let mut technique = technique(&field, name, settings);
-    let (mut compared, mut wrong, mut band, mut least_kept) = (0, 0, 0, 1.0f64);
+    let (mut compared, mut wrong, mut band, mut min_kept) = (0, 0, 0, 1.0f64);
     while compared < 20 {
         let view = random_view(&mut random);
         let list = select(&mut *technique, &view);
@@ -173,19 +173,19 @@ fn compare(name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
         compared += 1;
         wrong += usize::from(errors.screen_px.max > 0.1);
         band += rays.iter().filter(|s| s.silhouette).count();
-        least_kept = least_kept.min(kept);
+        min_kept = min_kept.min(kept);
     }
-    (wrong, band, least_kept)
+    (wrong, band, min_kept)
 }
 
 #[test]
 fn rays_find_the_same_errors_of_geomipmap() {
-    let (wrong, band, least_kept) = compare("geomipmap", &[("block", "17")]);
-    assert!(wrong > 10 && band > 1000 && least_kept < 0.99, "worth comparing: {wrong}, {band}, {least_kept}");
+    let (wrong, band, min_kept) = compare("geomipmap", &[("block", "17")]);
+    assert!(wrong > 10 && band > 1000 && min_kept < 0.99, "worth comparing: {wrong}, {band}, {min_kept}");
 }
 
 #[test]
 fn rays_find_no_errors_of_brute_force() {
-    let (wrong, band, least_kept) = compare("brute-force", &[]);
-    assert!(wrong == 0 && band > 1000 && least_kept == 1.0, "{wrong}, {band}, {least_kept}");
+    let (wrong, band, min_kept) = compare("brute-force", &[]);
+    assert!(wrong == 0 && band > 1000 && min_kept == 1.0, "{wrong}, {band}, {min_kept}");
 }

@@ -10,7 +10,7 @@ use cuesta::lod::Technique;
 use cuesta::plan::{Look, ScenePlan};
 use cuesta::profile::{self, Form, Profile, timeline, trace};
 use cuesta::scene::probed::ProbedFrame;
-use cuesta::scene::{Copy, Scene, Stage};
+use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::View;
 
 use super::trace_format::{self, Slice};
@@ -33,8 +33,8 @@ fn total(frame: &ProbedFrame) -> Counts {
 }
 
 /// The counts of a plain frame, as [`total`] has them.
-fn plain(stage: &mut Stage, technique: &mut dyn Technique, view: &View) -> [u64; 3] {
-    let times = stage.draw(technique, view, Copy::Picture).unwrap();
+fn plain(renderer: &mut SceneRenderer, technique: &mut dyn Technique, view: &View) -> [u64; 3] {
+    let times = renderer.draw(technique, view, Copy::Picture).unwrap();
     times.gpu.statistics.unwrap_or_default()
 }
 
@@ -45,18 +45,18 @@ fn the_counts_of_all_draws_are_the_frames_and_the_picture_stays() {
         let view = aslant(&field, [160, 120], 1.0);
         for name in ["brute-force", "geomipmap", "geomipmap:draw-per-block"] {
             let mut technique = technique(&field, name, if name == "brute-force" { &[] } else { &["block=17"] });
-            let mut stage = with_scene(gpu, &field, |scene| scene.stage(technique.as_ref(), view.size)).unwrap();
+            let mut renderer = with_scene(gpu, &field, |scene| scene.renderer(technique.as_ref(), view.size)).unwrap();
             for submission in [Submission::Direct, Submission::Indirect] {
-                stage.submission = Some(submission);
-                let expected = plain(&mut stage, technique.as_mut(), &view);
-                let picture = stage.picture();
-                let frame = stage.draw_probed(technique.as_mut(), name, &view).unwrap();
-                assert_eq!(stage.picture(), picture, "{name} {submission:?}");
-                assert_eq!(frame.draws.len(), stage.list.draws.len());
+                renderer.submission = Some(submission);
+                let expected = plain(&mut renderer, technique.as_mut(), &view);
+                let picture = renderer.picture();
+                let frame = renderer.draw_probed(technique.as_mut(), name, &view).unwrap();
+                assert_eq!(renderer.picture(), picture, "{name} {submission:?}");
+                assert_eq!(frame.draws.len(), renderer.list.draws.len());
                 let sum = total(&frame);
                 assert_eq!([sum.vertices, sum.primitives, sum.fragments], expected, "{name} {submission:?}");
                 if gpu.has_statistics {
-                    assert_eq!(sum.clipped, stage.list.triangles(), "every triangle reaches clipping");
+                    assert_eq!(sum.clipped, renderer.list.triangles(), "every triangle reaches clipping");
                 }
             }
         }
@@ -69,10 +69,10 @@ fn draws_beyond_the_pools_are_summed_in_one() {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 385], 3));
         let view = aslant(&field, [64, 48], 1e-3);
         let mut technique = technique(&field, "geomipmap:draw-per-block", &["block=9"]);
-        let mut stage = with_scene(gpu, &field, |scene| scene.stage(technique.as_ref(), view.size)).unwrap();
-        let expected = plain(&mut stage, technique.as_mut(), &view);
-        let frame = stage.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
-        let draws = stage.list.draws.len();
+        let mut renderer = with_scene(gpu, &field, |scene| scene.renderer(technique.as_ref(), view.size)).unwrap();
+        let expected = plain(&mut renderer, technique.as_mut(), &view);
+        let frame = renderer.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
+        let draws = renderer.list.draws.len();
         assert!(draws > DRAWS, "{draws} draws");
         assert_eq!(frame.draws.len(), DRAWS + 1);
         let rest = &frame.draws[DRAWS].piece;
@@ -90,9 +90,9 @@ fn host_and_device_stand_on_one_line_of_time() {
         let field = mountains();
         let view = aslant(&field, [160, 120], 1.0);
         let mut technique = technique(&field, "geomipmap", &["block=17"]);
-        let mut stage = with_scene(gpu, &field, |scene| scene.stage(technique.as_ref(), view.size)).unwrap();
+        let mut renderer = with_scene(gpu, &field, |scene| scene.renderer(technique.as_ref(), view.size)).unwrap();
         for _ in 0..3 {
-            let frame = stage.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
+            let frame = renderer.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
             let steps: Vec<_> = frame.steps.iter().map(|(step, _)| *step).collect();
             assert_eq!(steps, ["select", "upload", "record", "submit", "wait"]);
             assert!(frame.steps.windows(2).all(|s| s[0].1.end_us <= s[1].1.start_us), "{:?}", frame.steps);
@@ -114,10 +114,10 @@ fn time_goes_to_the_draw_that_took_it() {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [513, 513], 3));
         let view = aslant(&field, [640, 480], 1e-6);
         let mut parted = Parted(technique(&field, "brute-force", &[]));
-        let mut stage = with_scene(gpu, &field, |scene| scene.stage(&parted, view.size)).unwrap();
+        let mut renderer = with_scene(gpu, &field, |scene| scene.renderer(&parted, view.size)).unwrap();
         let mut share = [f64::INFINITY; 2];
         for _ in 0..4 {
-            let frame = stage.draw_probed(&mut parted, "brute-force", &view).unwrap();
+            let frame = renderer.draw_probed(&mut parted, "brute-force", &view).unwrap();
             let us: Vec<_> = frame.draws.iter().map(|draw| draw.span.us()).collect();
             assert_eq!(us.len(), 3);
             share = [share[0].min(us[0] / us[1]), share[1].min(us[2] / us[1])];
@@ -195,7 +195,7 @@ fn every_draw_is_one_slice_of_its_pipeline_and_its_pass() {
 }
 
 #[test]
-fn modes_draw_the_same_land_and_rows_add_up() {
+fn modes_draw_the_same_terrain_and_rows_add_up() {
     on_device(|gpu| {
         let (profile, _) = measure(gpu, 2);
         let modes: Vec<_> = profile.modes.iter().map(|m| (m.form.as_str(), m.submission.as_str())).collect();
@@ -223,8 +223,8 @@ fn without_statistics_there_are_no_counts() {
         let field = mountains();
         let view = aslant(&field, [160, 120], 1.0);
         let mut technique = technique(&field, "geomipmap", &["block=17"]);
-        let mut stage = with_scene(gpu, &field, |scene| scene.stage(technique.as_ref(), view.size)).unwrap();
-        let mut frame = stage.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
+        let mut renderer = with_scene(gpu, &field, |scene| scene.renderer(technique.as_ref(), view.size)).unwrap();
+        let mut frame = renderer.draw_probed(technique.as_mut(), "geomipmap", &view).unwrap();
         let (profile, _) = measure(gpu, 1);
         frame.draws.truncate(profile.draws.len());
         let mut rows = profile.draws;

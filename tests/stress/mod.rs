@@ -1,8 +1,8 @@
-//! The battery finds what is broken, says where, and keeps what shows it.
+//! The suite finds what is broken, says where, and keeps what shows it.
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, Manner};
+use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::height::{Field, Options, load};
 use cuesta::lod::{Entry, Settings, Technique, geomipmap};
 use cuesta::stress::jitter::{Jitter, LIMIT_PX, Way};
@@ -32,8 +32,8 @@ impl Technique for BlockLost {
     fn keeps_tolerance(&self) -> bool {
         true
     }
-    fn manner(&self) -> Manner {
-        self.0.manner()
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        self.0.pipeline_requirements()
     }
 }
 
@@ -66,7 +66,7 @@ fn form(entry: &'static Entry) -> Form {
 }
 
 fn case(name: &str) -> &'static Case {
-    cases().find(|case| case.name == name).expect("a case of the battery")
+    cases().find(|case| case.name == name).expect("a case of the suite")
 }
 
 fn failed(trial: &Trial) -> Vec<Finding> {
@@ -74,14 +74,14 @@ fn failed(trial: &Trial) -> Vec<Finding> {
 }
 
 #[test]
-fn what_is_broken_is_found_in_lands_and_flights_and_kept() {
+fn what_is_broken_is_found_in_terrains_and_flights_and_kept() {
     for name in ["prime sides, 131 x 67", "back again in mid-morph"] {
         let trial = Trial { case: case(name), form: Some(form(&BLOCK_LOST)) };
         let failed = failed(&trial);
         let finding =
             failed.iter().find(|finding| finding.check.starts_with("one surface")).expect("a surface with a gap");
-        let broken = finding.broken.as_ref().expect("the view that shows it");
-        assert!(broken.why.contains("Gap"), "{broken}");
+        let violation = finding.violation.as_ref().expect("the view that shows it");
+        assert!(violation.why.contains("Gap"), "{violation}");
         let folder = tempfile::tempdir().unwrap();
         let files = saved::counter_example(folder.path(), &trial, finding, None).unwrap();
         let extensions: Vec<_> = files.iter().map(|file| file.extension().unwrap().to_str().unwrap()).collect();
@@ -104,7 +104,7 @@ fn a_panic_is_a_finding() {
 fn no_number_never_passes() {
     assert!(!Finding::within("a check", f64::NAN, 1.0).passes());
     assert!(!Finding::within("a check", f64::INFINITY, 1.0).passes());
-    assert!(Finding::within("a check", 1.0, 1.0).passes() && Finding::told("a check", f64::NAN).passes());
+    assert!(Finding::within("a check", 1.0, 1.0).passes() && Finding::reported("a check", f64::NAN).passes());
 }
 
 /// The product trembles 16 times less than it may, and what it is compared with far more.
@@ -138,7 +138,7 @@ fn what_stands_alone_passes() {
 }
 
 #[test]
-fn a_battery_is_read_again_as_it_was_written_and_drawn_as_a_page() {
+fn a_suite_is_read_again_as_it_was_written_and_drawn_as_a_page() {
     let row = |check: &str, value: Option<f64>, limit: Option<f64>, pass: bool| Row {
         family: "data".to_string(),
         name: "flat <b>".to_string(),

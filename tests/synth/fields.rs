@@ -110,7 +110,7 @@ fn large_peers_are_bit_exact() {
 
 /// Water must find its way off the land: no inner sample lies below all its neighbours.
 #[test]
-fn eroded_land_has_no_pits() {
+fn eroded_terrain_has_no_pits() {
     let field = make(Kind::Eroded, [129, 97], 5);
     for (i, j) in (1..96).flat_map(|j| (1..128).map(move |i| (i, j))) {
         let around = (j - 1..=j + 1).flat_map(|b| (i - 1..=i + 1).map(move |a| (a, b))).filter(|&at| at != (i, j));

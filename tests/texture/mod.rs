@@ -197,14 +197,14 @@ impl Account {
     }
 
     /// The most texels of a frame for each pixel of the picture.
-    fn most(&self) -> f64 {
+    fn max(&self) -> f64 {
         self.frames.iter().map(|frame| frame[0] / SCREEN).fold(0.0, f64::max)
     }
 
     fn print(&self) {
         let mean = |of: fn(&[f64; 4]) -> f64| self.frames.iter().map(of).sum::<f64>() / self.frames.len() as f64;
         let (texels, nodes) = (mean(|frame| frame[0] / SCREEN), mean(|frame| frame[1]));
-        print!("{:28} {texels:7.2} texels a pixel, at most {:7.2}; {nodes:6.0} nodes", self.name, self.most());
+        print!("{:28} {texels:7.2} texels a pixel, at most {:7.2}; {nodes:6.0} nodes", self.name, self.max());
         if self.cut.is_some() {
             let [covered, rounded, held] = [mean(|f| f[2] / SCREEN), mean(|f| f[3] / f[2]), mean(|f| f[0] / f[3])];
             print!("; {covered:.2} pixels covered x {rounded:.2} by rounding up x {held:.2} beside pieces in nodes");
@@ -242,8 +242,8 @@ fn the_set_is_bounded_by_the_screen() {
     println!("{WEDGES} wedges, {FRAMES} frames");
     accounts.iter().for_each(Account::print);
     let [published, .., slots, _] = &accounts;
-    assert!(slots.most() <= 4.0, "{} texels a pixel", slots.most());
-    assert!(published.most() > 4.0 * slots.most(), "the published rules need more");
+    assert!(slots.max() <= 4.0, "{} texels a pixel", slots.max());
+    assert!(published.max() > 4.0 * slots.max(), "the published rules need more");
     // No less than what is seen needs: the picture is land but for some sky.
     assert!(slots.frames.iter().all(|frame| frame[0] > 0.5 * SCREEN));
 }

@@ -50,7 +50,7 @@ impl<'a> Viewer<'a> {
     }
 
     /// The next screenshot: it shows what the keys pressed before led to.
-    fn shoot(&self) -> RgbImage {
+    fn render(&self) -> RgbImage {
         self.press("p");
         self.pictures.set(self.pictures.get() + 1);
         picture(&self.folder.path().join(format!("cuesta-{:03}.png", self.pictures.get())))
@@ -59,7 +59,7 @@ impl<'a> Viewer<'a> {
     /// Presses keys and takes the next screenshot.
     fn after(&self, keys: &str) -> RgbImage {
         self.press(keys);
-        self.shoot()
+        self.render()
     }
 
     fn resize(&self, [width, height]: [u32; 2]) {
@@ -116,7 +116,7 @@ fn a_session_at_the_window() {
     on_display(|display| {
         let viewer = Viewer::open(display, &["demo"]);
         numbers_and_help(&viewer);
-        let start = viewer.shoot();
+        let start = viewer.render();
         assert!(brightness(&start, [0.6, 0.0, 0.4, 0.1]) > 180.0, "sky above");
         assert!(brightness(&start, [0.3, 0.4, 0.4, 0.4]) < 150.0, "land below");
         looks(&viewer, &start);
@@ -130,7 +130,7 @@ fn a_session_at_the_window() {
 /// The numbers at the top left, the help in the middle. Leaves both off.
 fn numbers_and_help(viewer: &Viewer) {
     let plate = [0.03, 0.04, 0.1, 0.1];
-    let with_numbers = viewer.shoot();
+    let with_numbers = viewer.render();
     let with_help = viewer.after("h");
     let bare = viewer.after("h u");
     assert!(brightness(&with_numbers, plate) < 120.0, "numbers lie on a dark plate");
@@ -153,8 +153,8 @@ fn looks(viewer: &Viewer, start: &RgbImage) {
     for _ in 0..7 {
         let next = viewer.after("c");
         // The ground's colours are much like those of heights, but for what is narrower than samples.
-        let least = if seen.len() == 7 { 0.005 } else { 0.05 };
-        assert!(seen.iter().all(|other| difference(other, &next) > least), "colours number {}", seen.len());
+        let min = if seen.len() == 7 { 0.005 } else { 0.05 };
+        assert!(seen.iter().all(|other| difference(other, &next) > min), "colours number {}", seen.len());
         seen.push(next);
     }
     assert_eq!(difference(start, &viewer.after("c")), 0.0, "and round");
@@ -166,7 +166,7 @@ fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
     for (k, entry) in cuesta::lod::TECHNIQUES.iter().enumerate() {
         viewer.press(&format!("{}", k + 1));
         eventually("the title", || (title() == format!("cuesta: demo, {}", entry.name)).then_some(()));
-        let drawn = viewer.shoot();
+        let drawn = viewer.render();
         assert!(difference(start, &drawn) < 0.1, "{}: {}", entry.name, difference(start, &drawn));
     }
     let geomipmap = cuesta::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
@@ -177,7 +177,7 @@ fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
     // Frozen, the levels stay as they were chosen for where the eye was.
     viewer.press("z");
     viewer.hold("s", Duration::from_millis(1500));
-    let frozen = viewer.shoot();
+    let frozen = viewer.render();
     assert!(difference(&fine, &frozen) > 0.1, "the eye has moved");
     let followed = viewer.after("z");
     assert!(difference(&frozen, &followed) > 0.02, "freeze: {}", difference(&frozen, &followed));
@@ -188,12 +188,12 @@ fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
 fn movement(viewer: &Viewer, start: &RgbImage) {
     for camera in ["fly", "orbit", "walk"] {
         viewer.hold("w", Duration::from_millis(600));
-        let before = viewer.shoot();
+        let before = viewer.render();
         if camera != "walk" {
             assert!(difference(start, &before) > 0.1, "{camera}: {}", difference(start, &before));
         }
         viewer.display.act("mousemove 160 120 mousedown 1 mousemove_relative 60 15");
-        let turned = viewer.shoot();
+        let turned = viewer.render();
         viewer.display.act("mouseup 1 click 4 click 4 click 5");
         assert!(difference(&before, &turned) > 0.1, "{camera}, dragged: {}", difference(&before, &turned));
         viewer.press("Tab");
@@ -206,7 +206,7 @@ fn sizes(viewer: &Viewer) {
     for size in [[500, 300], [1, 1], [640, 420], [321, 239], [200, 600], [320, 240]] {
         viewer.resize(size);
         assert_eq!(
-            eventually("the size", || Some(viewer.shoot()).filter(|p| p.dimensions() == size.into())).dimensions(),
+            eventually("the size", || Some(viewer.render()).filter(|p| p.dimensions() == size.into())).dimensions(),
             size.into()
         );
     }
@@ -215,7 +215,7 @@ fn sizes(viewer: &Viewer) {
         std::thread::sleep(Duration::from_millis(300));
         viewer.display.act(&format!("windowmap --sync {}", viewer.window));
         viewer.focus();
-        viewer.shoot();
+        viewer.render();
     }
 }
 
@@ -232,7 +232,7 @@ fn end(viewer: Viewer) {
 }
 
 /// Share of the pixels that are not the sky's.
-fn land(picture: &RgbImage) -> f64 {
+fn terrain(picture: &RgbImage) -> f64 {
     let sky = picture.get_pixel(picture.width() - 1, 0);
     let differs = |p: &&image::Rgb<u8>| p.0.iter().zip(sky.0).any(|(x, y)| x.abs_diff(y) > 12);
     picture.pixels().filter(differs).count() as f64 / f64::from(picture.width() * picture.height())
@@ -245,13 +245,13 @@ fn a_session_over_millimetres() {
         let model = ["--spacing", "0.005", "--height-scale", "0.0002", "--crop", "100,100,65,65"];
         let viewer = Viewer::open(display, &[&["demo"], &model[..]].concat());
         let start = viewer.after("u");
-        assert!(land(&start) > 0.1, "{} of it is land", land(&start));
+        assert!(terrain(&start) > 0.1, "{} of it is land", terrain(&start));
         for camera in ["fly", "orbit", "walk"] {
             for key in ["w", "d", "s", "Shift+s"] {
                 viewer.hold(key, Duration::from_millis(500));
             }
-            let seen = viewer.shoot();
-            assert!(land(&seen) > 0.01 && difference(&start, &seen) > 0.02, "{camera}: {} is land", land(&seen));
+            let seen = viewer.render();
+            assert!(terrain(&seen) > 0.01 && difference(&start, &seen) > 0.02, "{camera}: {} is land", terrain(&seen));
             viewer.press("Tab");
         }
         assert_eq!(difference(&start, &viewer.after("Home")), 0.0, "home again");
@@ -268,18 +268,23 @@ fn an_orthographic_session() {
         viewer.display.act("keydown Shift_L");
         viewer.hold("s", Duration::from_millis(2500));
         viewer.display.act("keyup Shift_L");
-        let wide = viewer.shoot();
-        assert!(land(&wide) > 0.01 && land(&wide) < 0.9 * land(&start), "{} of {}", land(&wide), land(&start));
+        let wide = viewer.render();
+        assert!(
+            terrain(&wide) > 0.01 && terrain(&wide) < 0.9 * terrain(&start),
+            "{} of {}",
+            terrain(&wide),
+            terrain(&start)
+        );
         viewer.hold("w", Duration::from_millis(1500));
-        let closer = viewer.shoot();
-        assert!(land(&closer) > 1.1 * land(&wide), "W: {} after {}", land(&closer), land(&wide));
+        let closer = viewer.render();
+        assert!(terrain(&closer) > 1.1 * terrain(&wide), "W: {} after {}", terrain(&closer), terrain(&wide));
         viewer.display.act("mousemove 160 120 click 5 click 5 click 5");
-        let wider = viewer.shoot();
-        assert!(land(&wider) < land(&closer), "wheel: {} after {}", land(&wider), land(&closer));
+        let wider = viewer.render();
+        assert!(terrain(&wider) < terrain(&closer), "wheel: {} after {}", terrain(&wider), terrain(&closer));
         viewer.press("Tab");
         viewer.hold("a", Duration::from_millis(800));
-        let orbited = viewer.shoot();
-        assert!(land(&orbited) > 0.01 && difference(&wider, &orbited) > 0.01, "orbit: {}", land(&orbited));
+        let orbited = viewer.render();
+        assert!(terrain(&orbited) > 0.01 && difference(&wider, &orbited) > 0.01, "orbit: {}", terrain(&orbited));
         assert_eq!(difference(&start, &viewer.after("Home")), 0.0, "home again");
         end(viewer);
     });

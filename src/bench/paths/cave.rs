@@ -12,7 +12,7 @@ use super::{Opening, Pose};
 /// About so many places along a side are looked at.
 const PLACES: u32 = 512;
 /// The way goes where there is this part of the most room, at least.
-const LEAST_ROOM: f64 = 0.3;
+const MIN_ROOM: f64 = 0.3;
 /// Corners of the way are means of so many places before and behind.
 const SMOOTHED: usize = 6;
 /// How far ahead the eye looks, as a part of the way.
@@ -80,15 +80,15 @@ struct Rooms {
     count: [usize; 2],
     /// By place, metres.
     heights: Vec<f64>,
-    most: f64,
+    max: f64,
 }
 
 impl Rooms {
     fn of(ground: &Ground) -> Self {
         let count = ground.field.size().map(|n| n.min(PLACES) as usize);
-        let mut rooms = Self { count, heights: Vec::new(), most: 0.0 };
+        let mut rooms = Self { count, heights: Vec::new(), max: 0.0 };
         rooms.heights = (0..count[0] * count[1]).map(|cell| ground.room(rooms.place(ground, cell))).collect();
-        rooms.most = rooms.heights.iter().copied().fold(0.0, f64::max);
+        rooms.max = rooms.heights.iter().copied().fold(0.0, f64::max);
         rooms
     }
 
@@ -114,8 +114,8 @@ impl Rooms {
             }
             (before[cell], last) = (came_from, cell);
             for next in self.beside(cell).filter(|&next| before[next] == usize::MAX) {
-                let wide = self.heights[next] / self.most;
-                if wide >= LEAST_ROOM {
+                let wide = self.heights[next] / self.max;
+                if wide >= MIN_ROOM {
                     reached.push(Reverse((length + (100.0 / (wide * wide)) as u64, next, cell)));
                 }
             }

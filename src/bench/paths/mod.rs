@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn every_path_sees_land_in_every_frame() {
+    fn every_path_sees_terrain_in_every_frame() {
         let field = synth(Kind::Fractal, [129, 129], 1);
         let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
         for path in PATHS {

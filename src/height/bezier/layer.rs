@@ -8,7 +8,7 @@ use crate::height::synth::noise;
 
 /// The most patches along an axis of an area that are looked at one by one: of more, the ends of all control points
 /// bound what lies there.
-const MOST_ALONG: i64 = 3;
+const MAX_ALONG: i64 = 3;
 
 /// The layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +96,7 @@ impl Layer {
     /// Ranges over an area.
     pub fn ranges(&self, area: &Area) -> Ranges {
         let (first, last) = (self.patch(area.min).0, self.patch(area.max).0);
-        let is_wide = (0..2).any(|k| last[k] - first[k] >= MOST_ALONG);
+        let is_wide = (0..2).any(|k| last[k] - first[k] >= MAX_ALONG);
         let hull = if is_wide { self.everywhere() } else { self.over(area, first, last) };
         let [x, z, xx, zz, xz] = hull.largest;
         Ranges {

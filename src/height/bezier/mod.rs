@@ -34,7 +34,7 @@ const ROUGHNESS: [f64; 2] = [0.1, 1.0];
 const ROUGHNESS_M: f64 = 131_072.0;
 
 /// The most layers of displacement: positions in f64 tell the patches of further ones no more apart.
-pub const MOST_LAYERS: u32 = 40;
+pub const MAX_LAYERS: u32 = 40;
 
 /// A square part of the plane, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl Bezier {
         Self {
             patches: Layer::new(seed, PATCH_M, RELIEF_M),
             roughness: Layer::new(seed.wrapping_add(1), ROUGHNESS_M, ROUGHNESS),
-            displacement: (0..layers.min(MOST_LAYERS)).map(layer).collect(),
+            displacement: (0..layers.min(MAX_LAYERS)).map(layer).collect(),
         }
     }
 
@@ -113,8 +113,8 @@ impl Bezier {
 
     /// Lowest and highest of all, metres.
     pub fn range_m(&self) -> [f64; 2] {
-        let most: f64 = self.displacement.iter().map(|layer| layer.ends()[1] * ROUGHNESS[1]).sum();
-        [RELIEF_M[0] - most, RELIEF_M[1] + most]
+        let max: f64 = self.displacement.iter().map(|layer| layer.ends()[1] * ROUGHNESS[1]).sum();
+        [RELIEF_M[0] - max, RELIEF_M[1] + max]
     }
 }
 
@@ -175,11 +175,12 @@ mod tests {
     /// lie beyond the bounds, which are no trivial ones. With few layers small triangles are bounded by bends alone.
     #[test]
     fn nothing_lies_beyond_its_bounds_at_any_depth() {
-        for (layers, depths) in [(MOST_LAYERS, 0..47), (3, 0..19)] {
-            let (land, mut dice) = (Bezier::new(5, layers), fastrand::Rng::with_seed(1));
+        for (layers, depths) in [(MAX_LAYERS, 0..47), (3, 0..19)] {
+            let (terrain, mut dice) = (Bezier::new(5, layers), fastrand::Rng::with_seed(1));
             for depth in depths.step_by(2) {
                 let side_m = SIDE_M / 2f64.powi(depth + 1);
-                let mut shares: Vec<f64> = (0..60).map(|k| found_share(&land, side_m, k % 2 == 0, &mut dice)).collect();
+                let mut shares: Vec<f64> =
+                    (0..60).map(|k| found_share(&terrain, side_m, k % 2 == 0, &mut dice)).collect();
                 shares.sort_by(f64::total_cmp);
                 println!("{layers} layers, {side_m:.1e} m: {:.3} of the bound is found", shares[30]);
                 // Below a micrometre rounding hides what is found.
@@ -189,17 +190,17 @@ mod tests {
     }
 
     /// How much of its bound the land's largest distance from a triangle is, as far as it is found.
-    fn found_share(land: &Bezier, side_m: f64, turned: bool, dice: &mut fastrand::Rng) -> f64 {
+    fn found_share(terrain: &Bezier, side_m: f64, turned: bool, dice: &mut fastrand::Rng) -> f64 {
         // Rounding: of the sum of the layers, and of the place where it is steep.
         const ROUNDING_M: f64 = 1e-9;
         let corners = triangle(place(dice), side_m, turned);
         let longest_m = side_m * if turned { 2.0 } else { 2f64.sqrt() };
-        let ends = |k: usize, least: f64, of: fn(f64, f64) -> f64| corners.iter().map(|c| c[k]).fold(least, of);
+        let ends = |k: usize, min: f64, of: fn(f64, f64) -> f64| corners.iter().map(|c| c[k]).fold(min, of);
         let area = Area {
             min: [0, 1].map(|k| ends(k, f64::INFINITY, f64::min)),
             max: [0, 1].map(|k| ends(k, f64::NEG_INFINITY, f64::max)),
         };
-        let (bounds, heights) = (land.bounds(&area, longest_m), corners.map(|c| land.height(c)));
+        let (bounds, heights) = (terrain.bounds(&area, longest_m), corners.map(|c| terrain.height(c)));
         let mut furthest = 0.0f64;
         for _ in 0..200 {
             let (mut u, mut v) = (dice.f64(), dice.f64());
@@ -207,7 +208,7 @@ mod tests {
                 (u, v) = (1.0 - u, 1.0 - v);
             }
             let mix = |[a, b, c]: [f64; 3]| a + u * (b - a) + v * (c - a);
-            let height = land.height([0, 1].map(|k| mix(corners.map(|c| c[k]))));
+            let height = terrain.height([0, 1].map(|k| mix(corners.map(|c| c[k]))));
             assert!(height >= bounds.height_m[0] - ROUNDING_M && height <= bounds.height_m[1] + ROUNDING_M);
             furthest = furthest.max((height - mix(heights)).abs() - ROUNDING_M);
         }
@@ -217,30 +218,32 @@ mod tests {
 
     #[test]
     fn bounds_of_a_part_are_within_those_of_the_whole() {
-        let (land, mut dice) = (Bezier::new(9, 30), fastrand::Rng::with_seed(2));
+        let (terrain, mut dice) = (Bezier::new(9, 30), fastrand::Rng::with_seed(2));
         for _ in 0..2000 {
             let reach_m = SIDE_M * 0.5f64.powi(dice.i32(1..40));
             let (at, part) = (place(&mut dice), dice.f64());
             let shift = |dice: &mut fastrand::Rng| (2.0 * dice.f64() - 1.0) * reach_m * (1.0 - part);
             let inner = [at[0] + shift(&mut dice), at[1] + shift(&mut dice)];
-            let whole = land.bounds(&Area::about(at, reach_m), reach_m);
-            let bounds = land.bounds(&Area::about(inner, reach_m * part), reach_m * dice.f64());
+            let whole = terrain.bounds(&Area::about(at, reach_m), reach_m);
+            let bounds = terrain.bounds(&Area::about(inner, reach_m * part), reach_m * dice.f64());
             assert!(bounds.deviation_m <= whole.deviation_m * (1.0 + 1e-12), "{bounds:?} in {whole:?}");
             let spare = 1e-9;
             assert!(bounds.height_m[0] >= whole.height_m[0] - spare && bounds.height_m[1] <= whole.height_m[1] + spare);
-            assert!(whole.height_m[0] >= land.range_m()[0] - spare && whole.height_m[1] <= land.range_m()[1] + spare);
+            assert!(
+                whole.height_m[0] >= terrain.range_m()[0] - spare && whole.height_m[1] <= terrain.range_m()[1] + spare
+            );
         }
     }
 
     #[test]
     fn slopes_are_those_of_the_heights() {
-        let (land, mut dice) = (Bezier::new(3, 12), fastrand::Rng::with_seed(3));
+        let (terrain, mut dice) = (Bezier::new(3, 12), fastrand::Rng::with_seed(3));
         for _ in 0..300 {
             let at = place(&mut dice);
-            let slopes = land.slopes(at, 0.0);
+            let slopes = terrain.slopes(at, 0.0);
             let step = 1e-3;
             let rise = [[step, 0.0], [0.0, step]]
-                .map(|[x, z]| land.height([at[0] + x, at[1] + z]) - land.height([at[0] - x, at[1] - z]));
+                .map(|[x, z]| terrain.height([at[0] + x, at[1] + z]) - terrain.height([at[0] - x, at[1] - z]));
             for k in 0..2 {
                 assert!((slopes[k] - rise[k] / (2.0 * step)).abs() < 1e-5, "{slopes:?}, {rise:?}");
             }

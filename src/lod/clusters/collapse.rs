@@ -1,7 +1,7 @@
 //! From the split nodes of the quadtree to clusters, in one pass.
 
+use super::lod_evaluator::LodEvaluator;
 use super::refine::{Found, Refinement, Split};
-use super::sight::Sight;
 use super::skirts::Skirts;
 use super::states::{Seeds, State};
 use super::tree::{Node, SIDES};
@@ -19,7 +19,7 @@ const SEAMS: [(u32, [u32; 2], usize); 4] = [(0, [0, 1], 2), (1, [2, 3], 2), (2, 
 /// The pass over a refined quadtree.
 pub struct Collapse<'a> {
     /// What the refinement was made from.
-    pub sight: &'a Sight<'a>,
+    pub evaluator: &'a LodEvaluator<'a>,
     /// The split nodes.
     pub refinement: &'a Refinement,
     /// The clusters.
@@ -37,7 +37,7 @@ impl Collapse<'_> {
     pub fn run(&self, drawn: &mut Vec<(u32, Instance)>) {
         if self.refinement.root == Found::Block {
             // A lone block is a quadrant of a parent that is not there.
-            drawn.push((0, self.lone_block(self.sight.tree.root())));
+            drawn.push((0, self.lone_block(self.evaluator.tree.root())));
         }
         for split in &self.refinement.splits {
             if self.single {
@@ -52,7 +52,7 @@ impl Collapse<'_> {
     /// What the quadrants of a split node hold that it draws itself: four blocks it leaves to its parent.
     fn state(&self, split: &Split) -> State {
         const ALL: u32 = 0b1111;
-        if split.blocks == ALL && split.node != self.sight.tree.root() {
+        if split.blocks == ALL && split.node != self.evaluator.tree.root() {
             return [NOTHING; 4];
         }
         let holds = |quadrant: usize| match split.children[quadrant] {
@@ -68,17 +68,17 @@ impl Collapse<'_> {
         if state == [NOTHING; 4] {
             return;
         }
-        let (seed, turns) = self.seeds.of(state);
+        let (seed, rotation) = self.seeds.of(state);
         let level = node.level - 1;
         let instance = match &self.skirts {
-            Some(skirts) => Instance { turns, ..self.skirted(skirts, node, level, blocks(node, state)) },
+            Some(skirts) => Instance { rotation, ..self.skirted(skirts, node, level, blocks(node, state)) },
             None => {
-                let weights = if self.sight.is_by_distance() {
-                    self.sight.ways.weights(level, 0, finer(state))
+                let weights = if self.evaluator.is_by_distance() {
+                    self.evaluator.ranges.weights(level, 0, finer(state))
                 } else {
                     self.weights(split, state)
                 };
-                Instance { turns, cells: 4 * self.cells, weights, ..self.placed(node, level) }
+                Instance { rotation, cells: 4 * self.cells, weights, ..self.placed(node, level) }
             }
         };
         drawn.push((seed as u32, instance));
@@ -89,8 +89,8 @@ impl Collapse<'_> {
         match &self.skirts {
             Some(skirts) => self.skirted(skirts, root, root.level, std::iter::once((0, root))),
             None => {
-                let is_by_distance = self.sight.is_by_distance();
-                let weights = if is_by_distance { self.sight.ways.weights(root.level, 0, 0) } else { [0; 4] };
+                let is_by_distance = self.evaluator.is_by_distance();
+                let weights = if is_by_distance { self.evaluator.ranges.weights(root.level, 0, 0) } else { [0; 4] };
                 Instance { cells: 2 * self.cells, weights, ..self.placed(root, root.level) }
             }
         }
@@ -102,13 +102,13 @@ impl Collapse<'_> {
             return self.skirted(skirts, node, node.level, std::iter::once((0, node)));
         }
         let is_sibling = |side: usize| node.beyond(side).is_some_and(|beyond| beyond.parent() == split.node);
-        let inside = split.weight(self.sight);
+        let inside = split.weight(self.evaluator);
         let side = |side: usize| {
-            if is_sibling(side) { inside } else { self.refinement.side_weight(self.sight, split, side) }
+            if is_sibling(side) { inside } else { self.refinement.side_weight(self.evaluator, split, side) }
         };
-        let weights = if self.sight.is_by_distance() {
+        let weights = if self.evaluator.is_by_distance() {
             let staying = SIDES.map(|side| u32::from(is_sibling(side)) << side).iter().sum();
-            self.sight.ways.weights(node.level, staying, 0)
+            self.evaluator.ranges.weights(node.level, staying, 0)
         } else {
             weights::uniform(inside, SIDES.map(side))
         };
@@ -124,7 +124,7 @@ impl Collapse<'_> {
 
     /// An instance at a node's first vertex, two mesh units a cell of a level.
     fn placed(&self, node: Node, level: u32) -> Instance {
-        let [x, z] = self.sight.tree.first(node);
+        let [x, z] = self.evaluator.tree.first(node);
         let origin = [x as i32, z as i32];
         Instance { origin, level, shift: level as i32 - 1, ..Instance::default() }
     }
@@ -137,12 +137,14 @@ impl Collapse<'_> {
         let mut sides = [None; 4];
         for quadrant in (0..4).filter(|&quadrant| state[quadrant as usize] != NOTHING) {
             let fine = self.four_blocks(split, state, quadrant);
-            let inside = fine.unwrap_or(split).weight(self.sight) | if fine.is_some() { FINER } else { 0 };
+            let inside = fine.unwrap_or(split).weight(self.evaluator) | if fine.is_some() { FINER } else { 0 };
             weights::set(&mut weights, weights::inside(quadrant as usize), inside);
             for (slot, side) in outer_sides(quadrant) {
                 let weight = match fine {
-                    Some(fine) => self.refinement.side_weight(self.sight, fine, side),
-                    None => *sides[side].get_or_insert_with(|| self.refinement.side_weight(self.sight, split, side)),
+                    Some(fine) => self.refinement.side_weight(self.evaluator, fine, side),
+                    None => {
+                        *sides[side].get_or_insert_with(|| self.refinement.side_weight(self.evaluator, split, side))
+                    }
                 };
                 weights::set(&mut weights, slot, weight);
             }
@@ -162,9 +164,9 @@ impl Collapse<'_> {
     /// The weight between two quadrants: beside one of four blocks that of its side.
     fn seam_weight(&self, split: &Split, state: State, quadrants: [u32; 2], side: usize) -> u32 {
         let weight = match quadrants.map(|quadrant| self.four_blocks(split, state, quadrant)) {
-            [Some(fine), _] => self.refinement.side_weight(self.sight, fine, side),
-            [None, Some(fine)] => self.refinement.side_weight(self.sight, fine, side ^ 2),
-            _ => split.weight(self.sight),
+            [Some(fine), _] => self.refinement.side_weight(self.evaluator, fine, side),
+            [None, Some(fine)] => self.refinement.side_weight(self.evaluator, fine, side ^ 2),
+            _ => split.weight(self.evaluator),
         };
         if weight < ONE { weight } else { STITCHED }
     }

@@ -18,34 +18,35 @@
 //!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
 //!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
 //! - with `morph=distance` every vertex has a weight by its own distance, so that edges agree by themselves; for that
-//!   the error is that of a whole level (`ways`), and finer levels reach farther than anywhere needed;
+//!   the error is that of a whole level (`ranges`), and finer levels reach farther than anywhere needed;
 //! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
 //!
 //! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
 //! (`error=measured`), no state between views.
 
 mod collapse;
-mod driver;
+mod gpu_selection;
+mod lod_evaluator;
 pub mod mesh;
+mod morph_ranges;
 mod refine;
-mod sight;
 mod skirts;
 pub mod states;
 mod tree;
-mod ways;
 
 use std::sync::Arc;
 
 use self::collapse::Collapse;
+use self::lod_evaluator::LodEvaluator;
 use self::mesh::Mesh;
 use self::refine::Refinement;
-use self::sight::Sight;
 use self::skirts::Skirts;
-use self::states::{MOST_SEEDS, Seeds};
+use self::states::{MAX_SEEDS, Seeds};
 use self::tree::Tree;
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, widened};
+use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
 use crate::draw::{
-    Draw, DrawList, Driver, Geometry, Instance, Limits, Manner, Morph, Seams, Source, Submission, Topology,
+    Draw, DrawList, Geometry, GpuSelection, Instance, Limits, Morph, PipelineRequirements, Seams, Source, Submission,
+    Topology,
 };
 use crate::height::bounds::Measure;
 use crate::height::{Field, MAX_SIDE};
@@ -56,7 +57,7 @@ use crate::view::View;
 const MORPH_RATIO: f32 = 1.3;
 
 /// The most blocks drawn, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
-const MOST_BLOCKS: usize = 1 << 16;
+const MAX_BLOCKS: usize = 1 << 16;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -96,7 +97,7 @@ pub const ENTRY: Entry = Entry {
     ],
     // Vertices that morph by distance share their edges.
     needs: &[Need { key: "seams", other: "morph", words: &["off", "on"] }],
-    most_samples: u64::MAX,
+    max_samples: u64::MAX,
     max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
@@ -124,8 +125,8 @@ enum Morphing {
 
 struct Clusters {
     /// The most clusters, or blocks, that a list holds.
-    most_drawn: usize,
-    driver: Option<Driver>,
+    max_drawn: usize,
+    gpu_selection: Option<GpuSelection>,
     tree: Tree,
     seeds: Seeds,
     mesh: Mesh,
@@ -163,34 +164,36 @@ impl Clusters {
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
         let mesh = Mesh::new(cells as i32, &seeds.states, seams);
         // A quadtree has at most three leaves more for each split node.
-        let most_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MOST_BLOCKS / 3);
-        let most_drawn = match mode {
-            Mode::DrawPerBlock => tree.nodes(0).min(3 * most_splits + 1),
+        let max_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MAX_BLOCKS / 3);
+        let max_drawn = match mode {
+            Mode::DrawPerBlock => tree.nodes(0).min(3 * max_splits + 1),
             // A split node draws at most one, and a lone root is one too.
-            _ => most_splits.max(1),
+            _ => max_splits.max(1),
         };
-        let is_driven = mode == Mode::GpuDriven;
-        let driver = is_driven.then(|| driver::driver(&tree, cells, seams, &seeds, &mesh, most_splits)).flatten();
-        let (refinement, drawn) = (Refinement::new(most_splits), Vec::new());
-        Self { most_drawn, driver, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn }
+        let selects_on_gpu = mode == Mode::GpuDriven;
+        let gpu_selection = selects_on_gpu
+            .then(|| gpu_selection::gpu_selection(&tree, cells, seams, &seeds, &mesh, max_splits))
+            .flatten();
+        let (refinement, drawn) = (Refinement::new(max_splits), Vec::new());
+        Self { max_drawn, gpu_selection, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn }
     }
 
     /// Refines the quadtree, under a wider tolerance if there would be too many blocks, and returns its scale.
     fn collapse(&mut self, view: &View) -> f64 {
-        let (sight, tolerance_scale) = widened(view, |wider| {
-            let sight = sight(&self.tree, self.morph, wider);
-            self.refinement.refine(&sight).then_some(sight)
+        let (evaluator, tolerance_scale) = select_within_limits(view, |wider| {
+            let evaluator = evaluator(&self.tree, self.morph, wider);
+            self.refinement.refine(&evaluator).then_some(evaluator)
         });
         let (refinement, seeds, single) = (&self.refinement, &self.seeds, self.mode == Mode::DrawPerBlock);
-        let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&sight, refinement));
+        let skirts = (self.seams == Seams::Skirts).then(|| Skirts::new(&evaluator, refinement));
         self.drawn.clear();
-        Collapse { sight: &sight, refinement, seeds, cells: self.cells, single, skirts }.run(&mut self.drawn);
+        Collapse { evaluator: &evaluator, refinement, seeds, cells: self.cells, single, skirts }.run(&mut self.drawn);
         tolerance_scale
     }
 
     /// A draw for each kind of cluster that occurs.
     fn draw_instanced(&self, list: &mut DrawList) {
-        let mut ends = [0u32; MOST_SEEDS + 1];
+        let mut ends = [0u32; MAX_SEEDS + 1];
         self.drawn.iter().for_each(|&(seed, _)| ends[seed as usize + 1] += 1);
         (1..ends.len()).for_each(|seed| ends[seed] += ends[seed - 1]);
         let mut next = ends;
@@ -226,11 +229,11 @@ impl Clusters {
     }
 }
 
-fn sight<'a>(tree: &'a Tree, morph: Morphing, view: &View) -> Sight<'a> {
+fn evaluator<'a>(tree: &'a Tree, morph: Morphing, view: &View) -> LodEvaluator<'a> {
     match morph {
-        Morphing::Off => Sight::new(tree, view, 1.0, true),
-        Morphing::Blocks => Sight::new(tree, view, MORPH_RATIO, false),
-        Morphing::Vertices => Sight::by_distance(tree, view),
+        Morphing::Off => LodEvaluator::new(tree, view, 1.0, true),
+        Morphing::Blocks => LodEvaluator::new(tree, view, MORPH_RATIO, false),
+        Morphing::Vertices => LodEvaluator::by_distance(tree, view),
     }
 }
 
@@ -241,42 +244,42 @@ impl Technique for Clusters {
 
     fn limits(&self) -> Limits {
         let is_instanced = matches!(self.mode, Mode::Indirect | Mode::GpuDriven);
-        let draws = if is_instanced { self.mesh.ranges.len() } else { self.most_drawn };
-        Limits { draws, instances: self.most_drawn, ..Limits::default() }
+        let draws = if is_instanced { self.mesh.ranges.len() } else { self.max_drawn };
+        Limits { draws, instances: self.max_drawn, ..Limits::default() }
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        list.widening = self.collapse(view);
+        list.tolerance_scale = self.collapse(view);
         match self.mode {
             Mode::Indirect | Mode::GpuDriven => self.draw_instanced(list),
             Mode::DrawPerBlock | Mode::DrawPerCluster => self.draw_each(list),
         }
     }
 
-    fn driver(&self) -> Option<&Driver> {
-        self.driver.as_ref()
+    fn gpu_selection(&self) -> Option<&GpuSelection> {
+        self.gpu_selection.as_ref()
     }
 
     fn parameters(&self, view: &View, words: &mut Vec<u32>) {
-        let sight = sight(&self.tree, self.morph, view);
-        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&sight.view)));
-        words.extend(sight.ways.ways.map(f32::to_bits));
+        let evaluator = evaluator(&self.tree, self.morph, view);
+        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&evaluator.view)));
+        words.extend(evaluator.ranges.ranges.map(f32::to_bits));
     }
 
     fn keeps_tolerance(&self) -> bool {
         self.measured
     }
 
-    fn manner(&self) -> Manner {
+    fn pipeline_requirements(&self) -> PipelineRequirements {
         let morph = match self.morph {
             Morphing::Vertices => Morph::ByDistance,
             // Without morphing too: sides that meet a coarser block fall onto its edge.
             Morphing::Off | Morphing::Blocks => Morph::ByInstance,
         };
-        Manner { morph, seams: self.seams, ..Manner::default() }
+        PipelineRequirements { morph, seams: self.seams, ..PipelineRequirements::default() }
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("kinds of clusters", self.mesh.ranges.len() as f64, ""),
             ("index bytes", size_of_val(self.mesh.geometry.indices.as_slice()) as f64, "B"),

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::sight::{Look, Sight};
+use super::lod_evaluator::{LodEvaluator, NodeVisibility};
 use super::tree::{Node, Squares, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
@@ -23,7 +23,7 @@ pub struct Split {
     /// Which node.
     pub node: Node,
     /// What the tolerance allows over its ε.
-    ratio: f32,
+    error_margin: f32,
     /// How it lies to what can be seen.
     containment: Containment,
     /// Which of its children are blocks in sight, a bit each.
@@ -46,7 +46,7 @@ pub enum Found {
 /// The split nodes of a view.
 pub struct Refinement {
     /// The most nodes that may be split.
-    most: usize,
+    max: usize,
     /// The split nodes.
     pub splits: Vec<Split>,
     /// Their places by level.
@@ -59,109 +59,109 @@ pub struct Refinement {
 }
 
 impl Refinement {
-    /// With at most `most` split nodes.
-    pub fn new(most: usize) -> Self {
+    /// With at most `max` split nodes.
+    pub fn new(max: usize) -> Self {
         let (splits, levels, index, squares) = (Vec::new(), Vec::new(), HashMap::default(), Vec::new());
-        Self { most, splits, levels, index, squares, root: Found::Nothing }
+        Self { max, splits, levels, index, squares, root: Found::Nothing }
     }
 
     /// Finds the split nodes of a view. `false` if there would be too many.
-    pub fn refine(&mut self, sight: &Sight) -> bool {
-        let root = sight.tree.root();
+    pub fn refine(&mut self, evaluator: &LodEvaluator) -> bool {
+        let root = evaluator.tree.root();
         self.levels.resize_with(root.level as usize + 1, Vec::new);
         self.levels.iter_mut().for_each(Vec::clear);
         self.splits.clear();
         self.index.clear();
-        self.descend(sight);
+        self.descend(evaluator);
         for level in 1..root.level as usize {
             for k in 0..self.levels[level].len() {
-                let Split { node, ratio, .. } = self.splits[self.levels[level][k] as usize];
-                self.restrict(sight, node, ratio);
+                let Split { node, error_margin, .. } = self.splits[self.levels[level][k] as usize];
+                self.restrict(evaluator, node, error_margin);
             }
         }
-        self.splits.len() <= self.most
+        self.splits.len() <= self.max
     }
 
     /// Splits what has to be, level by level.
-    fn descend(&mut self, sight: &Sight) {
-        let root = sight.tree.root();
-        self.root = self.found(sight, root, sight.look(root));
+    fn descend(&mut self, evaluator: &LodEvaluator) {
+        let root = evaluator.tree.root();
+        self.root = self.found(evaluator, root, evaluator.evaluate(root));
         for level in (1..=root.level as usize).rev() {
             // All of a level before any is looked at: what is far away in memory comes at the same time.
             self.squares.clear();
             let nodes = self.levels[level].iter().map(|&k| self.splits[k as usize].node);
-            self.squares.extend(nodes.map(|node| sight.tree.squares(node)));
+            self.squares.extend(nodes.map(|node| evaluator.tree.squares(node)));
             for n in 0..self.levels[level].len() {
-                self.look_into(sight, self.levels[level][n], self.squares[n]);
+                self.look_into(evaluator, self.levels[level][n], self.squares[n]);
             }
         }
     }
 
-    fn look_into(&mut self, sight: &Sight, k: u32, squares: Squares) {
+    fn look_into(&mut self, evaluator: &LodEvaluator, k: u32, squares: Squares) {
         let Split { node, containment, .. } = self.splits[k as usize];
-        for (quadrant, look) in sight.look_in(node, containment, &squares).into_iter().enumerate() {
-            let found = self.found(sight, node.child(quadrant as u32), look);
+        for (quadrant, evaluate) in evaluator.evaluate_children(node, containment, &squares).into_iter().enumerate() {
+            let found = self.found(evaluator, node.child(quadrant as u32), evaluate);
             self.splits[k as usize].hold(quadrant, found);
         }
     }
 
     /// What a node is that was looked at.
-    fn found(&mut self, sight: &Sight, node: Node, look: Look) -> Found {
-        let Some((containment, ratio)) = look else { return Found::Nothing };
-        if containment == Containment::Outside && sight.view.culls != 0 {
+    fn found(&mut self, evaluator: &LodEvaluator, node: Node, evaluate: NodeVisibility) -> Found {
+        let Some((containment, error_margin)) = evaluate else { return Found::Nothing };
+        if containment == Containment::Outside && evaluator.view.culls != 0 {
             return Found::Nothing;
         }
-        if ratio >= sight.view.band_end || self.splits.len() > self.most {
-            return block(is_in_sight(sight, node, containment));
+        if error_margin >= evaluator.view.band_end || self.splits.len() > self.max {
+            return block(is_in_sight(evaluator, node, containment));
         }
-        Found::Split(self.insert(sight, node, ratio, containment))
+        Found::Split(self.insert(evaluator, node, error_margin, containment))
     }
 
-    fn insert(&mut self, sight: &Sight, node: Node, ratio: f32, containment: Containment) -> u32 {
+    fn insert(&mut self, evaluator: &LodEvaluator, node: Node, error_margin: f32, containment: Containment) -> u32 {
         let k = self.splits.len() as u32;
-        if let Some(id) = node.id(sight.tree.root()) {
+        if let Some(id) = node.id(evaluator.tree.root()) {
             self.index.insert(id, k);
         }
         self.levels[node.level as usize].push(k);
-        self.splits.push(Split { node, ratio, containment, blocks: 0, children: [None; 4] });
+        self.splits.push(Split { node, error_margin, containment, blocks: 0, children: [None; 4] });
         k
     }
 
     /// Keeps the coarser neighbours on a node's own outer sides within a level of it.
-    fn restrict(&mut self, sight: &Sight, node: Node, ratio: f32) {
+    fn restrict(&mut self, evaluator: &LodEvaluator, node: Node, error_margin: f32) {
         for axis in 0..2 {
             // The first child's outer side is the first side.
             let side = axis + 2 * (node.at[axis] & 1) as usize;
             let Some(beyond) = node.beyond(side) else { continue };
             let coarser = beyond.parent();
-            if let Some(k) = self.find(sight.tree, coarser) {
+            if let Some(k) = self.find(evaluator.tree, coarser) {
                 let split = &mut self.splits[k as usize];
-                split.ratio = split.ratio.min(ratio);
-            } else if sight.draws(coarser) {
-                self.split_leaf(sight, coarser, ratio);
+                split.error_margin = split.error_margin.min(error_margin);
+            } else if evaluator.draws(coarser) {
+                self.split_leaf(evaluator, coarser, error_margin);
             }
         }
     }
 
     /// Splits a node that was a leaf, or in one.
-    fn split_leaf(&mut self, sight: &Sight, node: Node, ratio: f32) {
-        let k = self.insert(sight, node, ratio, Containment::Crossing);
+    fn split_leaf(&mut self, evaluator: &LodEvaluator, node: Node, error_margin: f32) {
+        let k = self.insert(evaluator, node, error_margin, Containment::Crossing);
         for quadrant in 0..4 {
             let child = node.child(quadrant as u32);
-            let found = match self.find(sight.tree, child) {
+            let found = match self.find(evaluator.tree, child) {
                 Some(place) => Found::Split(place),
-                None => block(self.is_leaf_in_sight(sight, child)),
+                None => block(self.is_leaf_in_sight(evaluator, child)),
             };
             self.splits[k as usize].hold(quadrant, found);
         }
         // A parent that is split later finds it.
-        if let Some(parent) = self.find(sight.tree, node.parent()) {
+        if let Some(parent) = self.find(evaluator.tree, node.parent()) {
             self.splits[parent as usize].hold(node.quadrant() as usize, Found::Split(k));
         }
     }
 
-    fn is_leaf_in_sight(&self, sight: &Sight, node: Node) -> bool {
-        sight.containment(node).is_some_and(|containment| is_in_sight(sight, node, containment))
+    fn is_leaf_in_sight(&self, evaluator: &LodEvaluator, node: Node) -> bool {
+        evaluator.containment(node).is_some_and(|containment| is_in_sight(evaluator, node, containment))
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
@@ -169,23 +169,23 @@ impl Refinement {
     }
 
     /// How far the blocks in a node have gone over into it, below [`ONE`]; `None` if it is not split.
-    pub fn weight(&self, sight: &Sight, node: Node) -> Option<u32> {
-        let k = self.find(sight.tree, node)?;
-        Some(self.splits[k as usize].weight(sight))
+    pub fn weight(&self, evaluator: &LodEvaluator, node: Node) -> Option<u32> {
+        let k = self.find(evaluator.tree, node)?;
+        Some(self.splits[k as usize].weight(evaluator))
     }
 
     /// The weight of a side of a split node, the greater of its two nodes': from [`ONE`] on the other one is not
     /// split, and `ONE` stands for its own level. Where nothing is drawn beyond, the node's own.
-    pub fn side_weight(&self, sight: &Sight, split: &Split, side: usize) -> u32 {
-        let own = split.weight(sight);
+    pub fn side_weight(&self, evaluator: &LodEvaluator, split: &Split, side: usize) -> u32 {
+        let own = split.weight(evaluator);
         let Some(beyond) = split.node.beyond(side) else { return own };
-        match self.weight(sight, beyond) {
+        match self.weight(evaluator, beyond) {
             Some(weight) => own.max(weight),
             // Where all of a node is in sight, so is the side that the other one shares with it.
-            None if sight.tree.square(beyond).is_none() => own,
-            None if split.containment != Containment::Inside && !sight.draws(beyond) => own,
-            None if sight.view.band_scale == 0.0 => ONE,
-            None => ONE + self.weight(sight, beyond.parent()).unwrap_or(0),
+            None if evaluator.tree.square(beyond).is_none() => own,
+            None if split.containment != Containment::Inside && !evaluator.draws(beyond) => own,
+            None if evaluator.view.band_scale == 0.0 => ONE,
+            None => ONE + self.weight(evaluator, beyond.parent()).unwrap_or(0),
         }
     }
 }
@@ -193,11 +193,11 @@ impl Refinement {
 impl Split {
     /// How far its blocks have gone over into it, below [`ONE`]. Where a node sticks out of the field midpoints are
     /// none, so there they stay.
-    pub fn weight(&self, sight: &Sight) -> u32 {
-        if sight.view.band_scale == 0.0 || sight.tree.is_partial(self.node) {
+    pub fn weight(&self, evaluator: &LodEvaluator) -> u32 {
+        if evaluator.view.band_scale == 0.0 || evaluator.tree.is_partial(self.node) {
             return 0;
         }
-        ((self.ratio - 1.0) * sight.view.band_scale).clamp(0.0, (ONE - 1) as f32) as u32
+        ((self.error_margin - 1.0) * evaluator.view.band_scale).clamp(0.0, (ONE - 1) as f32) as u32
     }
 
     fn hold(&mut self, quadrant: usize, found: Found) {
@@ -216,15 +216,15 @@ fn block(is_seen: bool) -> Found {
 
 /// Whether any of the finest blocks in a node may be seen: with the box of the whole alone a coarse block might be
 /// drawn where finer ones are not, and a wider tolerance would draw more.
-fn is_in_sight(sight: &Sight, node: Node, containment: Containment) -> bool {
+fn is_in_sight(evaluator: &LodEvaluator, node: Node, containment: Containment) -> bool {
     match containment {
         Containment::Outside => false,
         Containment::Inside => true,
         Containment::Crossing => {
             node.level == 0
                 || (0u32..)
-                    .zip(sight.contained_in(node))
-                    .any(|(quadrant, containment)| is_in_sight(sight, node.child(quadrant), containment))
+                    .zip(evaluator.contained_in(node))
+                    .any(|(quadrant, containment)| is_in_sight(evaluator, node.child(quadrant), containment))
         }
     }
 }

@@ -12,8 +12,8 @@
 //!
 //! `shaders/cluster_skirts.glsl` has the same functions, to the bit.
 
+use super::lod_evaluator::LodEvaluator;
 use super::refine::Refinement;
-use super::sight::Sight;
 use super::tree::{Node, SIDES};
 use crate::draw::skirts;
 use crate::draw::weights::{self, FINER, ONE};
@@ -27,7 +27,7 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// Finds the skirts of blocks.
 pub struct Skirts<'a> {
-    sight: &'a Sight<'a>,
+    evaluator: &'a LodEvaluator<'a>,
     refinement: &'a Refinement,
 }
 
@@ -42,8 +42,8 @@ struct Edge {
 
 impl<'a> Skirts<'a> {
     /// For a refinement in a view.
-    pub fn new(sight: &'a Sight<'a>, refinement: &'a Refinement) -> Self {
-        Self { sight, refinement }
+    pub fn new(evaluator: &'a LodEvaluator<'a>, refinement: &'a Refinement) -> Self {
+        Self { evaluator, refinement }
     }
 
     /// The weights of an instance of a level that draws these blocks, each in a quadrant: words 1 and 2 are its
@@ -67,7 +67,7 @@ impl<'a> Skirts<'a> {
 
     /// The most, metres, that a block can be apart from what is drawn beyond a side; `None` if it is not at all.
     fn gap_m(&self, block: Node, side: usize) -> Option<f32> {
-        let tree = self.sight.tree;
+        let tree = self.evaluator.tree;
         let (own, other) = (self.edge(block), self.edge_at(block.beyond(side)?)?);
         if (own.level, own.weight) == (other.level, other.weight) {
             return None;
@@ -75,29 +75,30 @@ impl<'a> Skirts<'a> {
         let [low, high] = tree.square(block)?.range;
         let [_, apart] = tree.deviation(block);
         let gap = (own.error_m + other.error_m).min(apart) + ROUNDING * low.abs().max(high.abs());
-        let further = self.sight.raster_m(block)?.min(tree.cell_m(block.level) as f32);
-        Some((gap + further) * (1.0 + f32::EPSILON))
+        let second_target = self.evaluator.raster_m(block)?.min(tree.cell_m(block.level) as f32);
+        Some((gap + second_target) * (1.0 + f32::EPSILON))
     }
 
     /// What is drawn at a node: it, its parent or the blocks in it. Beyond the root is nothing.
     fn edge_at(&self, node: Node) -> Option<Edge> {
-        if node.level == self.sight.tree.root().level {
+        if node.level == self.evaluator.tree.root().level {
             return None;
         }
-        let is_split = |node| self.refinement.weight(self.sight, node).is_some();
+        let is_split = |node| self.refinement.weight(self.evaluator, node).is_some();
         if is_split(node) {
-            let children =
-                (0..4).map(|quadrant| node.child(quadrant)).filter(|child| self.sight.tree.square(*child).is_some());
+            let children = (0..4)
+                .map(|quadrant| node.child(quadrant))
+                .filter(|child| self.evaluator.tree.square(*child).is_some());
             let edges = children.map(|child| self.edge(child));
             return edges.reduce(|a, b| Edge { error_m: a.error_m.max(b.error_m), ..a });
         }
         let block = if is_split(node.parent()) { node } else { node.parent() };
-        self.sight.draws(block).then(|| self.edge(block))
+        self.evaluator.draws(block).then(|| self.edge(block))
     }
 
     fn edge(&self, block: Node) -> Edge {
-        let of = |node| self.sight.tree.deviation(node)[0];
-        let weight = self.refinement.weight(self.sight, block.parent()).unwrap_or(0);
+        let of = |node| self.evaluator.tree.deviation(node)[0];
+        let weight = self.refinement.weight(self.evaluator, block.parent()).unwrap_or(0);
         let (own, part) = (of(block), weight as f32 / ONE as f32);
         // A root has no parent to go to.
         let error_m = if weight == 0 { own } else { own + (of(block.parent()) - own) * part };

@@ -8,14 +8,14 @@
 pub type State = [u8; 4];
 
 /// Seeds at most.
-pub const MOST_SEEDS: usize = 23;
+pub const MAX_SEEDS: usize = 23;
 
 /// Where a quarter turn, (x, z) to (cells − z, x), takes each quadrant.
 const TURNED: [usize; 4] = [1, 3, 0, 2];
 
 /// A state after quarter turns.
-pub fn turned(state: State, turns: u32) -> State {
-    (0..turns).fold(state, |state, _| {
+pub fn turned(state: State, rotation: u32) -> State {
+    (0..rotation).fold(state, |state, _| {
         let mut next = State::default();
         (0..4).for_each(|quadrant| next[TURNED[quadrant]] = state[quadrant]);
         next
@@ -44,13 +44,13 @@ impl Seeds {
     pub fn new(single: bool) -> Self {
         let mut seeds = Self { states: Vec::new(), table: [(0, 0); 81] };
         for seed in 1..if single { 2 } else { 81 } {
-            let turns = [0, 1, 2, 3].map(|turns| turned(state(seed), turns));
-            if turns.iter().any(|&turn| number(turn) < seed) {
+            let rotation = [0, 1, 2, 3].map(|rotation| turned(state(seed), rotation));
+            if rotation.iter().any(|&turn| number(turn) < seed) {
                 continue;
             }
             // A state that turns into itself is turned as little as possible.
             for turn in [3, 2, 1, 0] {
-                seeds.table[number(turns[turn])] = (seeds.states.len() as u8, turn as u8);
+                seeds.table[number(rotation[turn])] = (seeds.states.len() as u8, turn as u8);
             }
             seeds.states.push(state(seed));
         }
@@ -64,8 +64,8 @@ impl Seeds {
 
     /// The seed of a state, and the quarter turns that make it the state.
     pub fn of(&self, state: State) -> (usize, u32) {
-        let (seed, turns) = self.table[number(state)];
-        (usize::from(seed), u32::from(turns))
+        let (seed, rotation) = self.table[number(state)];
+        (usize::from(seed), u32::from(rotation))
     }
 }
 
@@ -79,17 +79,17 @@ mod tests {
     #[test]
     fn every_state_is_a_turned_seed() {
         let seeds = Seeds::new(false);
-        assert_eq!([seeds.states.len(), MOST_SEEDS], [23; 2]);
+        assert_eq!([seeds.states.len(), MAX_SEEDS], [23; 2]);
         for number in 1..81 {
-            let (seed, turns) = seeds.of(state(number));
-            assert_eq!(turned(seeds.states[seed], turns), state(number));
+            let (seed, rotation) = seeds.of(state(number));
+            assert_eq!(turned(seeds.states[seed], rotation), state(number));
         }
         let single: BTreeSet<_> =
             (1..81).map(state).filter(|s| s.iter().all(|&q| q < 2)).map(|s| seeds.of(s).0).collect();
         assert_eq!(single.len(), 5);
         // No seed is a turn of another.
-        let turns: BTreeSet<_> = seeds.states.iter().flat_map(|&s| (0..4).map(move |t| turned(s, t))).collect();
-        assert_eq!(turns.len(), 80);
+        let rotation: BTreeSet<_> = seeds.states.iter().flat_map(|&s| (0..4).map(move |t| turned(s, t))).collect();
+        assert_eq!(rotation.len(), 80);
     }
 
     /// The turned triangles of the seed are those of the state, made by a mesh of its own.
@@ -98,11 +98,11 @@ mod tests {
         let n = 8;
         let seeds = Seeds::new(false);
         let mesh = Mesh::new(n, &seeds.states, Seams::Shared);
-        let set = |mesh: &Mesh, seed: usize, turns: u32| -> BTreeSet<[[i32; 2]; 3]> {
+        let set = |mesh: &Mesh, seed: usize, rotation: u32| -> BTreeSet<[[i32; 2]; 3]> {
             let range = &mesh.ranges[seed];
             let indices = &mesh.geometry.indices[range.start as usize..range.end as usize];
             let turn =
-                |[x, z]: [i32; 2]| [[x, z], [4 * n - z, x], [4 * n - x, 4 * n - z], [z, 4 * n - x]][turns as usize];
+                |[x, z]: [i32; 2]| [[x, z], [4 * n - z, x], [4 * n - x, 4 * n - z], [z, 4 * n - x]][rotation as usize];
             let corner = |&k: &u32| turn(mesh.geometry.lattice[k as usize].position);
             // Corners in cyclic order from the smallest: the winding counts.
             let canonical = |t: &[u32]| {
@@ -112,9 +112,9 @@ mod tests {
             indices.chunks_exact(3).map(canonical).collect()
         };
         for number in 1..81 {
-            let (seed, turns) = seeds.of(state(number));
+            let (seed, rotation) = seeds.of(state(number));
             let own = Mesh::new(n, &[state(number)], Seams::Shared);
-            let drawn = set(&mesh, seed, turns);
+            let drawn = set(&mesh, seed, rotation);
             assert_eq!(drawn, set(&own, 0, 0), "{:?}", state(number));
             for (quadrant, &what) in state(number).iter().enumerate() {
                 let of = |t: &&[[i32; 2]; 3]| {

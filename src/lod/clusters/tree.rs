@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
-use super::ways;
+use super::morph_ranges;
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure, Square};
 use crate::height::progress::Progress;
@@ -66,7 +66,7 @@ impl Node {
 pub enum Errors {
     /// Measured against the samples.
     Measured,
-    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ways`]).
+    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ranges`]).
     ByLevel(Vec<f32>),
     /// Judnich & Ling 2012, eq. 2: half the parent's; the root's is the range of heights, metres.
     Halved(f32),
@@ -84,7 +84,7 @@ pub struct Squares {
 impl Squares {
     /// Which of them have land, a bit each.
     #[inline]
-    pub fn has_land(&self) -> u32 {
+    pub fn has_terrain(&self) -> u32 {
         self.range[0].cmple(self.range[1]).bitmask()
     }
 }
@@ -111,7 +111,7 @@ impl Tree {
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
         let errors = match (measure.errors, by_level) {
             (false, _) => Errors::Halved((high - low).max(0.0)),
-            (true, true) => Errors::ByLevel(ways::errors(field, &bounds)),
+            (true, true) => Errors::ByLevel(morph_ranges::errors(field, &bounds)),
             (true, false) => Errors::Measured,
         };
         let last = field.size().map(|n| n - 1);
@@ -160,7 +160,7 @@ impl Tree {
             return None;
         }
         let square = self.bounds.square(node.level, node.at);
-        square.has_land().then(|| Square { error: self.error(node.level, square.error), ..square })
+        square.has_terrain().then(|| Square { error: self.error(node.level, square.error), ..square })
     }
 
     /// What is known of a node's children, a lane each.

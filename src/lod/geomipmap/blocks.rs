@@ -20,14 +20,14 @@ pub struct Blocks {
     /// that is drawn on the way from the level before.
     errors: Vec<f32>,
     /// Range of heights, from the blocks (level 0) up to one node; `None` where there is no land at all.
-    ranges: Vec<Level>,
+    ranges: Vec<BlockLevel>,
     spacing: [f64; 2],
     origin: [f64; 2],
     last: [u32; 2],
 }
 
 /// One level of the quadtree: each node covers 2 × 2 of the level below, fewer at the field's far edges.
-struct Level {
+struct BlockLevel {
     count: [u32; 2],
     ranges: Vec<Option<[f32; 2]>>,
 }
@@ -43,12 +43,12 @@ impl Blocks {
             .into_par_iter()
             .map(|k| {
                 let block = Block::new(field, cells, [k % count[0], k / count[0]].map(|n| n as i32));
-                let measured = (block.range_of_land(), block.errors(&shapes));
+                let measured = (block.range_of_terrain(), block.errors(&shapes));
                 progress.advance(1);
                 measured
             })
             .unzip();
-        let mut tree = vec![Level { count, ranges }];
+        let mut tree = vec![BlockLevel { count, ranges }];
         while tree.last().is_some_and(|level| level.ranges.len() > 1) {
             tree.push(tree[tree.len() - 1].parent());
         }
@@ -101,7 +101,7 @@ impl Blocks {
     }
 
     fn descend(&self, f: &Frustum, level: usize, i: u32, j: u32, inside: bool, visit: &mut impl FnMut(usize)) {
-        let Level { count, ranges } = &self.ranges[level];
+        let BlockLevel { count, ranges } = &self.ranges[level];
         if i >= count[0] || j >= count[1] {
             return;
         }
@@ -121,8 +121,8 @@ impl Blocks {
     }
 }
 
-impl Level {
-    fn parent(&self) -> Level {
+impl BlockLevel {
+    fn parent(&self) -> BlockLevel {
         let count = self.count.map(|n| n.div_ceil(2));
         let node = |i: u32, j: u32| {
             let children = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(di, dj)| (2 * i + di, 2 * j + dj));
@@ -133,6 +133,6 @@ impl Level {
                 .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
         };
         let ranges = (0..count[1]).flat_map(|j| (0..count[0]).map(move |i| node(i, j))).collect();
-        Level { count, ranges }
+        BlockLevel { count, ranges }
     }
 }

@@ -99,9 +99,9 @@ impl<'a> Block<'a> {
     }
 
     /// The range, or `None` if no triangle of the finest level has data at its three corners.
-    pub fn range_of_land(&self) -> Option<[f32; 2]> {
+    pub fn range_of_terrain(&self) -> Option<[f32; 2]> {
         let [first, last] = self.ends();
-        surface::has_land(self.field, first, last).then(|| self.range())
+        surface::has_terrain(self.field, first, last).then(|| self.range())
     }
 
     /// ε by level, saturated.
@@ -129,7 +129,7 @@ impl<'a> Block<'a> {
         let instance = Instance {
             origin: self.at.map(|n| n * self.cells),
             cells: self.cells as u32,
-            turns: coarsest_turn(self.at, self.cells >> shape.level),
+            rotation: coarsest_turn(self.at, self.cells >> shape.level),
             level: shape.level,
             weights: weights::uniform(shape.morph, shape.edge_morph),
             ..Instance::default()
@@ -192,8 +192,8 @@ mod tests {
             for (level, draw) in (0..4).flat_map(|level| (0..20).map(move |draw| (level, draw))) {
                 let furthest = if level == 3 { 1 } else { 2 };
                 // Half of them at the corners.
-                let mut weight = |most: u32| {
-                    let whole = most as f32 * random();
+                let mut weight = |max: u32| {
+                    let whole = max as f32 * random();
                     (if draw < 10 { whole * ONE as f32 } else { whole.round() * ONE as f32 }) as u32
                 };
                 let (v, e) = (weight(1), [0; 4].map(|_| weight(furthest)));

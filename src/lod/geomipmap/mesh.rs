@@ -23,13 +23,14 @@ pub mod side {
 pub const CLASSES: [u8; 6] = [0b0000, 0b0001, 0b0011, 0b0101, 0b0111, 0b1111];
 
 /// A quarter turn maps left to top, top to right, right to bottom, bottom to left: one bit to the next.
-fn turned(mask: u8, turns: u32) -> u8 {
-    ((mask << turns) | (mask >> (4 - turns))) & 15
+fn turned(mask: u8, rotation: u32) -> u8 {
+    ((mask << rotation) | (mask >> (4 - rotation))) & 15
 }
 
 /// Class and quarter turns (0–3) that give a mask.
 pub fn class_of(mask: u8) -> (usize, u32) {
-    let find = |turns| CLASSES.iter().position(|&class| turned(class, turns) == mask).map(|class| (class, turns));
+    let find =
+        |rotation| CLASSES.iter().position(|&class| turned(class, rotation) == mask).map(|class| (class, rotation));
     (0..4).find_map(find).expect("six classes and their turns cover all masks")
 }
 
@@ -159,8 +160,8 @@ mod tests {
     fn six_turned_classes_are_the_sixteen_masks() {
         for n in [2, 4, 8, 16, 32, 64, 128, 256] {
             for mask in 0..16 {
-                let (class, turns) = class_of(mask);
-                let turn = |[x, z]: [i32; 2]| [[x, z], [n - z, x], [n - x, n - z], [z, n - x]][turns as usize];
+                let (class, rotation) = class_of(mask);
+                let turn = |[x, z]: [i32; 2]| [[x, z], [n - z, x], [n - x, n - z], [z, n - x]][rotation as usize];
                 let turned = border(n, CLASSES[class]).into_iter().map(|t| t.map(turn));
                 assert_eq!(set(turned), set(border(n, mask)), "n {n}, mask {mask:04b}");
             }

@@ -27,8 +27,10 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Need, Setting, Settings, Spared, Technique, Values, Variant};
-use crate::draw::{Draw, DrawList, Geometry, Instance, Limits, Manner, Morph, Source, Submission, Topology, weights};
+use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
+use crate::draw::{
+    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology, weights,
+};
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
@@ -75,7 +77,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     needs: &[Need { key: "base", other: "distance", words: &["linear", "exponential"] }],
-    most_samples: 1 << 34,
+    max_samples: 1 << 34,
     max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(GeoMipMap::new(&field, settings)),
@@ -168,13 +170,13 @@ impl GeoMipMap {
     fn instance(&self, block: usize) -> Instance {
         let (i, j) = (block as u32 % self.blocks.count[0], block as u32 / self.blocks.count[0]);
         let level = self.level(block);
-        let (_, turns) = self.masks.border(self.mask(block));
+        let (_, rotation) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
         Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
             shift: 0,
-            turns: turns.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
+            rotation: rotation.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
             level,
             batch: 0,
             weights: if self.morph { self.weights(block) } else { [0; 4] },
@@ -268,31 +270,34 @@ impl Technique for GeoMipMap {
         self.distance == Distance::Error
     }
 
-    fn manner(&self) -> Manner {
-        Manner { morph: if self.morph { Morph::ByInstance } else { Morph::No }, ..Manner::default() }
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        PipelineRequirements {
+            morph: if self.morph { Morph::ByInstance } else { Morph::No },
+            ..PipelineRequirements::default()
+        }
     }
 
-    fn spared(&self) -> Vec<Spared> {
+    fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             let mesh = BlockMesh::used(self.blocks.cells, self.masks, finest, alone);
             size_of_val(mesh.geometry.indices.as_slice()) as u64
         };
-        let mut spared = Vec::new();
+        let mut omitted = Vec::new();
         if self.finest > 0 {
             let reason = format!("every block is exact at level {}", self.finest);
             let bytes = indices(0, false) - indices(self.finest, false);
-            spared.push(Spared { what: "indices of finer levels", reason, bytes });
+            omitted.push(Omitted { what: "indices of finer levels", reason, bytes });
         }
         if self.blocks.count == [1, 1] {
             let reason = "one block holds the field".to_string();
             let bytes = indices(self.finest, false) - indices(self.finest, true);
-            spared.push(Spared { what: "indices of stitched borders", reason: reason.clone(), bytes });
-            spared.push(Spared { what: "quadtree", reason, bytes: 0 });
+            omitted.push(Omitted { what: "indices of stitched borders", reason: reason.clone(), bytes });
+            omitted.push(Omitted { what: "quadtree", reason, bytes: 0 });
         }
-        spared
+        omitted
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("blocks", f64::from(self.blocks.count[0] * self.blocks.count[1]), ""),
             ("index bytes, six classes", self.index_bytes[0] as f64, "B"),

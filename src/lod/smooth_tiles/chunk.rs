@@ -23,7 +23,7 @@ pub struct Place {
 }
 
 /// One level of a tile.
-struct Level<'a> {
+struct ChunkLevel<'a> {
     field: &'a Field,
     place: Place,
     level: u32,
@@ -43,21 +43,21 @@ fn side_slot(side: usize) -> Slot {
 
 /// The vertices of a tile at a level, row by row.
 pub fn build(field: &Field, place: Place, level: u32) -> Vec<ExplicitVertex> {
-    let tile = Level { field, place, level, n: place.cells >> level };
+    let tile = ChunkLevel { field, place, level, n: place.cells >> level };
     let vertex = |at: [i32; 2]| {
-        let [height, target, further] = tile.values(at, &|at| tile.height(at));
+        let [height, target, second_target] = tile.values(at, &|at| tile.height(at));
         let (position, regions) = (at.map(|n| n << level), tile.regions(at));
-        ExplicitVertex { position, height, target, further, regions, ..ExplicitVertex::default() }
+        ExplicitVertex { position, height, target, second_target, regions, ..ExplicitVertex::default() }
     };
     tile.vertices().map(vertex).collect()
 }
 
 /// Their normals, which go over as their heights do.
 pub fn build_normals(field: &Field, place: Place, level: u32) -> Vec<VertexNormals> {
-    let tile = Level { field, place, level, n: place.cells >> level };
+    let tile = ChunkLevel { field, place, level, n: place.cells >> level };
     let normals = |at: [i32; 2]| {
-        let [normal, target, further] = tile.values(at, &|at| tile.normal(at)).map(normals::pack);
-        VertexNormals { normal, target, further }
+        let [normal, target, second_target] = tile.values(at, &|at| tile.normal(at)).map(normals::pack);
+        VertexNormals { normal, target, second_target }
     };
     tile.vertices().map(normals).collect()
 }
@@ -81,7 +81,7 @@ impl Value for Vec3 {
     }
 }
 
-impl Level<'_> {
+impl ChunkLevel<'_> {
     fn vertices(&self) -> impl Iterator<Item = [i32; 2]> {
         let n = self.n;
         (0..=n).flat_map(move |z| (0..=n).map(move |x| [x, z]))

@@ -16,7 +16,7 @@ const LEVEL_FRAMES: f64 = 30.0;
 const LEVEL_WAY: f64 = 0.25;
 
 /// Levels, or ways in tiles, that are too little for a step are kept for the next one.
-const LEAST: f64 = 1.0 / 1024.0;
+const MIN: f64 = 1.0 / 1024.0;
 
 /// What drives morphs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,9 +83,9 @@ impl Clock {
         };
         // Time that goes back, or is no number, moves nothing.
         self.rest = Step { levels: self.rest.levels + levels.max(0.0), way_m: self.rest.way_m + way_m };
-        let released = |rest: &mut f64, least: f64| if *rest < least { 0.0 } else { std::mem::take(rest) };
+        let released = |rest: &mut f64, min: f64| if *rest < min { 0.0 } else { std::mem::take(rest) };
         let Step { levels, way_m } = &mut self.rest;
-        Step { levels: released(levels, LEAST), way_m: released(way_m, LEAST * self.side_m) }
+        Step { levels: released(levels, MIN), way_m: released(way_m, MIN * self.side_m) }
     }
 }
 
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn the_land_is_still_while_the_viewer_is() {
+    fn the_terrain_is_still_while_the_viewer_is() {
         let mut clock = clock(Drive::Speed);
         let mut at = |view: &View| step(&mut clock, view);
         assert_eq!(at(&view(DVec3::ZERO, 0.0, 1e9)), 0);

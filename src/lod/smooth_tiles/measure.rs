@@ -45,8 +45,8 @@ impl<'a> Tile<'a> {
     }
 
     /// Range of heights, metres; `None` if no triangle of the finest level has data.
-    pub fn range_of_land(&self) -> Option<[f32; 2]> {
-        surface::has_land(self.field, self.place.origin, self.last()).then(|| self.range())
+    pub fn range_of_terrain(&self) -> Option<[f32; 2]> {
+        surface::has_terrain(self.field, self.place.origin, self.last()).then(|| self.range())
     }
 
     fn range(&self) -> [f32; 2] {
@@ -168,7 +168,7 @@ mod tests {
             let tile = Tile::new(&field, Place { origin: [k / 2 % 2, k % 2].map(|n| n as i32 * CELLS), cells: CELLS });
             let (errors, still) = (tile.errors(true), tile.errors(false));
             for (level, draw) in (0..4u32).flat_map(|level| (0..40).map(move |draw| (level, draw))) {
-                let mut weight = |most: f32| if draw < 20 { most * random() } else { (most * random()).round() };
+                let mut weight = |max: f32| if draw < 20 { max * random() } else { (max * random()).round() };
                 let inside = weight(1.0);
                 // Sides are at most one level beyond the inside.
                 let side = weight(if level == 3 { 1.0 } else { 1.0 + inside });

@@ -41,10 +41,10 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Need, Setting, Settings, Spared, Technique, Values, widened};
+use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{
-    Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Normals, Source, Topology, Upload,
-    VertexNormals, weights,
+    Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
+    Topology, Upload, VertexNormals, weights,
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -97,7 +97,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     needs: &[Need { key: "clock", other: "morph", words: &["on"] }],
-    most_samples: 1 << 30,
+    max_samples: 1 << 30,
     max_side: MAX_SIDE,
     takes_endless: false,
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
@@ -166,7 +166,7 @@ impl SmoothTiles {
         let patterns = Patterns::new(cells, tiles.finest(), tiles.total() == 1);
         let side_m = f64::from(cells) * field.spacing[0].max(field.spacing[1]);
         let (top, count) = (tiles.levels - 1, tiles.total());
-        let mut room = Self {
+        let mut technique = Self {
             resident: Geometry {
                 vertices: vec![ExplicitVertex::default(); queue.vertices()],
                 normals: vec![VertexNormals::default(); if has_normals { queue.vertices() } else { 0 }],
@@ -188,8 +188,8 @@ impl SmoothTiles {
             patterns,
             queue,
         };
-        room.build_coarsest(top);
-        room
+        technique.build_coarsest(top);
+        technique
     }
 
     fn build_coarsest(&mut self, top: u32) {
@@ -227,7 +227,7 @@ impl SmoothTiles {
 
     /// Finds how coarse tiles may be under the first tolerance at which the buffer holds them all, and returns its scale.
     fn widen(&mut self, view: &View) -> f64 {
-        widened(view, |wider| {
+        select_within_limits(view, |wider| {
             self.find_ceilings(wider);
             self.queue.holds(self.ceilings[1].iter().map(|level| level / ONE)).then_some(())
         })
@@ -322,7 +322,7 @@ impl Technique for SmoothTiles {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        list.widening = self.widen(view);
+        list.tolerance_scale = self.widen(view);
         self.move_levels(view);
         self.find_visible(view);
         self.rebuild(view, &mut list.uploads);
@@ -331,7 +331,7 @@ impl Technique for SmoothTiles {
             *level = (*level).clamp(standing * ONE, (standing + 1) * ONE);
         }
         let waits = |&&tile: &&usize| self.levels[tile] > self.ceilings[0][tile];
-        list.waiting = self.visible.iter().filter(waits).count();
+        list.pending = self.visible.iter().filter(waits).count();
         self.visible.iter().for_each(|&tile| self.push(tile, list));
     }
 
@@ -349,31 +349,31 @@ impl Technique for SmoothTiles {
         true
     }
 
-    fn manner(&self) -> Manner {
+    fn pipeline_requirements(&self) -> PipelineRequirements {
         let normals = if self.has_normals { Normals::Vertices } else { Normals::Texture };
-        Manner { draws: Draws::EXPLICIT, normals, ..Manner::default() }
+        PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
-    fn spared(&self) -> Vec<Spared> {
+    fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             size_of_val(Patterns::new(self.tiles.cells, finest, alone).indices.as_slice()) as u64
         };
         let (finest, is_alone) = (self.tiles.finest(), self.tiles.total() == 1);
-        let mut spared = Vec::new();
+        let mut omitted = Vec::new();
         if finest > 0 {
             let reason = format!("every tile is exact at level {finest}");
             let bytes = indices(0, false) - indices(finest, false);
-            spared.push(Spared { what: "indices of finer levels", reason, bytes });
+            omitted.push(Omitted { what: "indices of finer levels", reason, bytes });
         }
         if is_alone {
             let reason = "one tile holds the field".to_string();
             let bytes = indices(finest, false) - indices(finest, true);
-            spared.push(Spared { what: "indices of stitched borders", reason, bytes });
+            omitted.push(Omitted { what: "indices of stitched borders", reason, bytes });
         }
-        spared
+        omitted
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let bytes = |count: usize| (count * vertex_bytes(self.has_normals)) as f64;
         let whole = [
             ("tiles", self.tiles.total() as f64, ""),

@@ -63,7 +63,7 @@ impl Pool {
     }
 
     /// Vertices of pages that hold a number of chunks of any levels, with two pages of each level more.
-    pub fn most_vertices(sizes: &[usize], chunks: usize) -> usize {
+    pub fn max_vertices(sizes: &[usize], chunks: usize) -> usize {
         (chunks.div_ceil(CHUNKS) + 3 * sizes.len()) * CHUNKS * sizes[0]
     }
 

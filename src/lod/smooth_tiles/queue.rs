@@ -43,7 +43,7 @@ pub struct Queue {
 
 impl Queue {
     /// All tiles at their coarsest level, and at most so many vertices, if those fit.
-    pub fn new(tiles: &Tiles, most_vertices: usize) -> Self {
+    pub fn new(tiles: &Tiles, max_vertices: usize) -> Self {
         let sizes: Vec<_> = (0..tiles.levels).map(|level| chunk::vertices(tiles.cells, level)).collect();
         let (top, count) = (tiles.levels - 1, tiles.total());
         let all_at = |levels: &[u32]| -> Vec<usize> {
@@ -51,9 +51,9 @@ impl Queue {
         };
         // All of the finest level that is used, twice, so that all may change in one frame; the coarsest at least.
         let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
-        let whole = whole.max(Pool::most_vertices(&sizes, count));
-        let least = settled_vertices(&sizes, &all_at(&[top]));
-        let mut pool = Pool::new(sizes, whole.min(most_vertices).max(least));
+        let whole = whole.max(Pool::max_vertices(&sizes, count));
+        let min = settled_vertices(&sizes, &all_at(&[top]));
+        let mut pool = Pool::new(sizes, whole.min(max_vertices).max(min));
         let first_vertices =
             (0..count).map(|_| pool.take(top, 0).expect("the pool holds the coarsest level")).collect();
         let left = Budget { chunks: 0, vertices: 0 };

@@ -39,7 +39,7 @@ impl Tiles {
             .into_par_iter()
             .map(|k| {
                 let tile = Tile::new(field, place(cells, count, k));
-                (tile.range_of_land(), tile.errors(morphs))
+                (tile.range_of_terrain(), tile.errors(morphs))
             })
             .unzip();
         let mut tree = vec![Nodes { count, ranges }];

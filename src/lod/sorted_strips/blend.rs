@@ -22,7 +22,7 @@
 
 use super::pages::Grid;
 use super::splits::Levels;
-use super::walk::Ground;
+use super::walk::WalkContext;
 use crate::draw::ExplicitVertex;
 use crate::draw::place::morphed_height;
 
@@ -64,7 +64,7 @@ impl Blend {
     }
 }
 
-impl<L: Levels> Ground<'_, L> {
+impl<L: Levels> WalkContext<'_, L> {
     /// The vertex that is at a position when it stands: the same wherever it is asked for.
     pub(super) fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
         let [x, z] = position;

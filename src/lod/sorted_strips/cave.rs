@@ -20,17 +20,19 @@ use super::blend::Blend;
 use super::certified::{Certified, bounds, guarded};
 use super::footprint::Footprint;
 use super::measure::Errors;
-use super::pages::{Gaze, Grid, Pages, Row};
+use super::pages::{Grid, Pages, Row, TraversalDirection};
 use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::topology;
-use super::walk::{Ground, Stream, Worker};
-use super::{ENTRY, MOST_PAGES, MOST_TRIANGLES, join_streams};
-use crate::draw::{Draw, DrawList, Draws, ExplicitVertex, Geometry, Instance, Limits, Manner, Source, Topology};
+use super::walk::{Stream, WalkContext, Worker};
+use super::{ENTRY, MAX_PAGES, MAX_TRIANGLES, join_streams};
+use crate::draw::{
+    Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
+};
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::lod::{Settings, Technique, widened};
+use crate::lod::{Settings, Technique, select_within_limits};
 use crate::view::{Containment, Lens, View};
 
 /// Sorted strips over a floor and a ceiling.
@@ -48,7 +50,7 @@ pub struct CaveStrips {
     sequence: Sequence,
     topology: Topology,
     /// Indices of a frame as they are walked: three a triangle.
-    most_indices: usize,
+    max_indices: usize,
     limits: Limits,
     /// Parts of the picture beside it in which squares are as fine as in it.
     guard: f64,
@@ -84,16 +86,16 @@ struct RowWorker {
 impl CaveStrips {
     /// Measures both fields. Of the room's settings it takes `page`, `order`, `topology` and `guard`; levels are certified.
     pub fn new(cave: Arc<Cave>, settings: &Settings) -> Self {
-        let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MOST_PAGES);
+        let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MAX_PAGES);
         let (pages, cells) = (grid.count[0] as usize * grid.count[1] as usize, grid.side() as usize);
         let rows = grid.count[0].max(grid.count[1]) as usize;
         let topology = topology::of(settings.word("topology"));
-        let most_indices = 3 * (4 * pages * cells * cells).min(MOST_TRIANGLES);
+        let max_indices = 3 * (4 * pages * cells * cells).min(MAX_TRIANGLES);
         let limits = Limits {
             draws: rows,
             instances: rows,
-            vertices: (2 * pages * (cells + 1) * (cells + 1)).min(MOST_TRIANGLES),
-            indices: topology::most_indices(topology, most_indices),
+            vertices: (2 * pages * (cells + 1) * (cells + 1)).min(MAX_TRIANGLES),
+            indices: topology::max_indices(topology, max_indices),
             ..Limits::default()
         };
         Self {
@@ -106,7 +108,7 @@ impl CaveStrips {
             rows: Vec::new(),
             sequence: Sequence::of(settings.word("order")),
             topology,
-            most_indices,
+            max_indices,
             limits,
             guard: settings.number("guard"),
             nothing: Geometry::default(),
@@ -132,26 +134,26 @@ impl CaveStrips {
     fn split(&mut self, view: &View) -> bool {
         self.splits.clear();
         // A split square has at least six triangles more, floor and ceiling twice as many.
-        let most = self.most_indices / 18 + 1;
+        let max = self.max_indices / 18 + 1;
         let seen = guarded(view, self.guard);
         [self.cave.floor(), self.cave.ceiling()].into_iter().zip(&self.errors).all(|(field, errors)| {
-            Certified::new(field, errors, &self.pages, [view, &seen], most).split(&mut self.splits)
+            Certified::new(field, errors, &self.pages, [view, &seen], max).split(&mut self.splits)
         })
     }
 
     /// Walks the rows of a frame; `false` if they do not fit.
-    fn walk(&mut self, view: &View, gaze: &Gaze, rows: &[Row]) -> bool {
-        let (field, sight) = (&**self.cave.floor(), Sight::new(self.cave.floor(), view));
+    fn walk(&mut self, view: &View, traversal: &TraversalDirection, rows: &[Row]) -> bool {
+        let (field, rays) = (&**self.cave.floor(), RaySource::new(self.cave.floor(), view));
         let (pages, levels, shapes) = (&self.pages, &self.splits, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blend: Blend::Off };
+        let context = WalkContext { field, pages, levels, shapes, traversal: *traversal, blend: Blend::Off };
         rows.par_iter().zip(&mut self.rows).for_each(|(row, RowWorker { worker, pairs })| {
             worker.stream.clear();
-            ground.walk_on(row, worker);
-            pairs.fill(&self.cave, &sight, &worker.stream);
+            context.walk_on(row, worker);
+            pairs.fill(&self.cave, &rays, &worker.stream);
         });
         let made = || self.rows[..rows.len()].iter().map(|row| &row.pairs.stream);
         made().map(|s| s.vertices.len()).sum::<usize>() <= self.limits.vertices
-            && made().map(|s| s.indices.len()).sum::<usize>() <= self.most_indices
+            && made().map(|s| s.indices.len()).sum::<usize>() <= self.max_indices
     }
 
     fn fill(&self, rows: usize, list: &mut DrawList) {
@@ -182,23 +184,23 @@ impl Technique for CaveStrips {
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
         self.look(view);
-        let gaze = Gaze::new(self.cave.floor(), view);
-        let rows = self.pages.rows(&gaze);
+        let traversal = TraversalDirection::new(self.cave.floor(), view);
+        let rows = self.pages.rows(&traversal);
         self.rows.resize_with(rows.len().max(self.rows.len()), RowWorker::default);
-        let fits = |wider: &View| (self.split(wider) && self.walk(wider, &gaze, &rows)).then_some(());
-        list.widening = widened(view, fits).1;
+        let fits = |wider: &View| (self.split(wider) && self.walk(wider, &traversal, &rows)).then_some(());
+        list.tolerance_scale = select_within_limits(view, fits).1;
         self.fill(rows.len(), list);
     }
 
-    fn manner(&self) -> Manner {
-        Manner { draws: Draws::explicit(self.topology), ..Manner::default() }
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        PipelineRequirements { draws: DrawKinds::explicit(self.topology), ..PipelineRequirements::default() }
     }
 
     fn keeps_tolerance(&self) -> bool {
         true
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let open = self.is_open.iter().filter(|is_open| **is_open).count();
         let bytes = self.errors.iter().map(Errors::bytes).sum::<usize>();
         vec![("pages", open as f64, ""), ("bytes of errors", bytes as f64, "B")]
@@ -217,12 +219,12 @@ fn is_open(cave: &Cave, grid: &Grid, page: u32) -> bool {
 }
 
 /// Where rays come from, in samples and metres: a point, or a direction that they come from.
-struct Sight {
+struct RaySource {
     from: [f64; 3],
     is_point: bool,
 }
 
-impl Sight {
+impl RaySource {
     fn new(field: &Field, view: &View) -> Self {
         let ([dx, dz], [x, z]) = (field.spacing, field.origin);
         let (eye, forward) = (view.eye, view.forward());
@@ -251,7 +253,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn fill(&mut self, cave: &Cave, sight: &Sight, floor: &Stream) {
+    fn fill(&mut self, cave: &Cave, rays: &RaySource, floor: &Stream) {
         let Self { stream: Stream { vertices, indices }, over } = self;
         vertices.clear();
         vertices.extend_from_slice(&floor.vertices);
@@ -277,7 +279,7 @@ impl Pairs {
                 continue;
             }
             let down = [high[0], high[2], high[1]];
-            let is_above = sight.is_above(high.map(|k| &vertices[k as usize]));
+            let is_above = rays.is_above(high.map(|k| &vertices[k as usize]));
             indices.extend(if is_above { [down, *low] } else { [*low, down] }.as_flattened());
         }
     }

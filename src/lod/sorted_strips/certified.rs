@@ -18,14 +18,14 @@ pub struct Certified<'a> {
     pages: &'a Pages,
     frustum: Frustum,
     allowance: Allowance,
-    most: usize,
+    max: usize,
 }
 
 impl<'a> Certified<'a> {
-    /// Under the view's tolerance, in the sight of `seen`: the view, or one that sees more. It stops at `most` split
+    /// Under the view's tolerance, in the sight of `seen`: the view, or one that sees more. It stops at `max` split
     /// squares.
-    pub fn new(field: &'a Field, errors: &'a Errors, pages: &'a Pages, [view, seen]: [&View; 2], most: usize) -> Self {
-        Self { field, errors, pages, frustum: seen.frustum(), allowance: view.allowance(), most }
+    pub fn new(field: &'a Field, errors: &'a Errors, pages: &'a Pages, [view, seen]: [&View; 2], max: usize) -> Self {
+        Self { field, errors, pages, frustum: seen.frustum(), allowance: view.allowance(), max }
     }
 
     /// Fills an empty set; `false` if there would be too many.
@@ -36,17 +36,17 @@ impl<'a> Certified<'a> {
             self.descend(level, page, range, Containment::Crossing, splits);
         }
         splits.close(self.pages);
-        splits.count() <= self.most
+        splits.count() <= self.max
     }
 
     /// Splits a square as far as needed. Its triangles lie in the range of `around`, the square that it lies in: a pair
     /// that matches a coarser quad reaches into the square beside it.
     fn descend(&self, level: u32, at: [i32; 2], around: [f32; 2], seen: Containment, splits: &mut Splits) {
-        if splits.count() > self.most {
+        if splits.count() > self.max {
             return;
         }
         let square = self.errors.square(level, at);
-        if !square.has_land() || square.error == 0.0 {
+        if !square.has_terrain() || square.error == 0.0 {
             return;
         }
         let bounds = bounds(self.field, level, at, around);
@@ -80,8 +80,8 @@ pub fn guarded(view: &View, band: f64) -> View {
 /// The box around a square, its part outside the field left out, metres.
 pub fn bounds(field: &Field, level: u32, at: [i32; 2], range: [f32; 2]) -> Aabb {
     let last = field.size().map(|n| n as i32 - 1);
-    let corner = |further: i32, y: f32| {
-        let [x, z] = [0, 1].map(|k| f64::from(((at[k] + further) << level).min(last[k])));
+    let corner = |second_target: i32, y: f32| {
+        let [x, z] = [0, 1].map(|k| f64::from(((at[k] + second_target) << level).min(last[k])));
         field.world_at(x, z, f64::from(y))
     };
     Aabb { min: corner(0, range[0]), max: corner(1, range[1]) }

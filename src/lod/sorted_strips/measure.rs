@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::shapes::{Shape, Shapes};
 use crate::height::Field;
 use crate::height::bounds::{KEPT_FROM, Square};
-use crate::height::kept::Kept;
+use crate::height::disk_cache::DiskCache;
 use crate::height::surface::{self, Corner};
 
 /// Samples of a tiled field of which no two squares lie in their tiles alike, and that are measured all the same.
-const MOST_SAMPLES: u64 = 1 << 22;
+const MAX_SAMPLES: u64 = 1 << 22;
 
 /// All squares of a field up to a level.
 pub struct Errors {
@@ -21,13 +21,13 @@ pub struct Errors {
     /// Whether an axis repeats.
     is_tiled: [bool; 2],
     /// From level 1.
-    levels: Vec<Level>,
+    levels: Vec<PageErrors>,
     /// Of the last level: whether any triangle of the samples' own surface has data.
-    land: Vec<bool>,
+    terrain: Vec<bool>,
 }
 
 /// The squares of a level; those of a tiled axis are held once.
-struct Level {
+struct PageErrors {
     count: [u32; 2],
     squares: Vec<Square>,
 }
@@ -36,70 +36,74 @@ struct Level {
 type Patterns = [[Vec<[[i32; 2]; 3]>; 4]; 2];
 
 impl Errors {
-    /// Measures a field up to level `most`, in parallel, or finds what was kept when it was measured before.
-    pub fn new(field: &Field, most: u32) -> Self {
+    /// Measures a field up to level `max`, in parallel, or finds what was kept when it was measured before.
+    pub fn new(field: &Field, max: u32) -> Self {
         let (size, stored) = (field.size(), field.stored());
         let is_tiled = [0, 1].map(|k| size[k] > stored[k]);
-        let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new(), land: Vec::new() };
+        let mut errors = Self { last: size.map(|n| n as i32 - 1), is_tiled, levels: Vec::new(), terrain: Vec::new() };
         let is_large = stored.iter().map(|&n| u64::from(n)).product::<u64>() >= KEPT_FROM;
-        let kept = is_large.then(|| Kept::new(field, &format!("strips-{most}"))).flatten();
-        if kept.as_ref().and_then(Kept::read).is_some_and(|content| errors.fill(field, most, &content)) {
+        let cache = is_large.then(|| DiskCache::new(field, &format!("strips-{max}"))).flatten();
+        if cache.as_ref().and_then(DiskCache::read).is_some_and(|content| errors.fill(field, max, &content)) {
             return errors;
         }
-        errors.measure(field, most);
-        kept.inspect(|kept| kept.write(&errors.content()));
+        errors.measure(field, max);
+        cache.inspect(|cache| cache.write(&errors.content()));
         errors
     }
 
-    fn measure(&mut self, field: &Field, most: u32) {
+    fn measure(&mut self, field: &Field, max: u32) {
         let patterns = patterns();
-        for level in 1..=most {
+        for level in 1..=max {
             let level = self.measured(field, level, &patterns);
             self.levels.push(level);
         }
-        self.land = self.measured_land(field, most);
+        self.terrain = self.measured_terrain(field, max);
     }
 
     /// Everything that was measured.
     fn content(&self) -> Vec<u8> {
         let squares = self.levels.iter().flat_map(|level| bytemuck::cast_slice(&level.squares));
-        squares.copied().chain(self.land.iter().map(|&is_land| is_land.into())).collect()
+        squares.copied().chain(self.terrain.iter().map(|&is_terrain| is_terrain.into())).collect()
     }
 
     /// Takes what was measured of a field like this one; `false`, and nothing changes, if it is not that long.
-    fn fill(&mut self, field: &Field, most: u32, content: &[u8]) -> bool {
-        let counts: Vec<_> = (1..=most).map(|level| self.count(field, level).unwrap_or([1, 1])).collect();
+    fn fill(&mut self, field: &Field, max: u32, content: &[u8]) -> bool {
+        let counts: Vec<_> = (1..=max).map(|level| self.count(field, level).unwrap_or([1, 1])).collect();
         let squares = |[x, z]: [u32; 2]| x as usize * z as usize;
         let lengths = counts.iter().map(|&count| squares(count) * size_of::<Square>());
-        let land = counts.last().map_or(0, |&count| squares(count));
-        if lengths.clone().sum::<usize>() + land != content.len() {
+        let terrain = counts.last().map_or(0, |&count| squares(count));
+        if lengths.clone().sum::<usize>() + terrain != content.len() {
             return false;
         }
         let mut rest = content;
         for (&count, length) in counts.iter().zip(lengths) {
             let (own, after) = rest.split_at(length);
-            self.levels.push(Level { count, squares: bytemuck::pod_collect_to_vec(own) });
+            self.levels.push(PageErrors { count, squares: bytemuck::pod_collect_to_vec(own) });
             rest = after;
         }
-        self.land = rest.iter().map(|&byte| byte != 0).collect();
+        self.terrain = rest.iter().map(|&byte| byte != 0).collect();
         true
     }
 
-    fn measured_land(&self, field: &Field, level: u32) -> Vec<bool> {
+    fn measured_terrain(&self, field: &Field, level: u32) -> Vec<bool> {
         let count = self.levels[level as usize - 1].count;
-        let is_land = |at: [u32; 2]| {
+        let is_terrain = |at: [u32; 2]| {
             let first = at.map(|n| (n as i32) << level);
             let last = [0, 1].map(|k| (first[k] + (1 << level)).min(self.last[k]));
             // Squares that may lie anywhere have land if the field has.
             let anywhere = count == [1, 1] && self.is_tiled != [false; 2];
-            if anywhere { surface::has_land(field, [0; 2], self.last) } else { surface::has_land(field, first, last) }
+            if anywhere {
+                surface::has_terrain(field, [0; 2], self.last)
+            } else {
+                surface::has_terrain(field, first, last)
+            }
         };
-        places(count).map(is_land).collect()
+        places(count).map(is_terrain).collect()
     }
 
     /// Whether any triangle of the samples' own surface has data in a square of the last level.
-    pub fn has_land(&self, at: [i32; 2]) -> bool {
-        self.land[self.index(self.levels.len() as u32, at)]
+    pub fn has_terrain(&self, at: [i32; 2]) -> bool {
+        self.terrain[self.index(self.levels.len() as u32, at)]
     }
 
     /// Bytes held.
@@ -111,7 +115,7 @@ impl Errors {
     #[inline]
     pub fn square(&self, level: u32, at: [i32; 2]) -> Square {
         let square = self.held(level, at);
-        if square.has_land() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
+        if square.has_terrain() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
             let parent =
                 if self.levels.len() > level as usize { self.held(level + 1, at.map(|n| n >> 1)) } else { square };
             return Square { error: parent.range[1] - parent.range[0], ..square };
@@ -155,26 +159,26 @@ impl Errors {
         };
         let lengths = [length(0), length(1)];
         let tile = stored.iter().map(|&n| u64::from(n)).product::<u64>();
-        let fits = lengths[0] * lengths[1] <= tile.max(MOST_SAMPLES);
+        let fits = lengths[0] * lengths[1] <= tile.max(MAX_SAMPLES);
         fits.then(|| lengths.map(|length| length.div_ceil(1 << level) as u32))
     }
 
-    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> Level {
+    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> PageErrors {
         let Some(count) = self.count(field, level) else { return self.anything(field) };
         let squares = places(count).map(|at| self.measured_square(field, level, at.map(|n| n as i32), patterns));
-        Level { count, squares: squares.collect() }
+        PageErrors { count, squares: squares.collect() }
     }
 
     /// Squares that may lie anywhere: their triangles are somewhere between the lowest and the highest sample.
-    fn anything(&self, field: &Field) -> Level {
+    fn anything(&self, field: &Field) -> PageErrors {
         let heights = (0..field.samples().len()).map(|k| field.samples().height(k));
         let range = heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)]);
-        Level { count: [1, 1], squares: vec![Square { error: range[1] - range[0], range }] }
+        PageErrors { count: [1, 1], squares: vec![Square { error: range[1] - range[0], range }] }
     }
 
     fn measured_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
         let inner = self.inner(field, level, at);
-        if !inner.has_land() {
+        if !inner.has_terrain() {
             return inner;
         }
         let parity = ((at[0] + at[1]) & 1) as usize;
@@ -306,12 +310,12 @@ mod tests {
         for field in [rough([75, 52], 7919), rough([64, 32], 7919).tiled([2, 2]), rough([41, 32], 7919).tiled([2, 1])] {
             let measured = Errors::new(&field, 4);
             let content = measured.content();
-            let mut again = Errors { levels: Vec::new(), land: Vec::new(), ..Errors::new(&field, 1) };
+            let mut again = Errors { levels: Vec::new(), terrain: Vec::new(), ..Errors::new(&field, 1) };
             assert!(again.fill(&field, 4, &content));
             assert_eq!(again.content(), content);
             let last = field.size().map(|n| (n as i32 - 2) >> 2);
             assert_eq!(again.square(2, last), measured.square(2, last));
-            let mut short = Errors { levels: Vec::new(), land: Vec::new(), ..Errors::new(&field, 1) };
+            let mut short = Errors { levels: Vec::new(), terrain: Vec::new(), ..Errors::new(&field, 1) };
             assert!(!short.fill(&field, 4, &content[1..]) && !short.fill(&field, 3, &content));
         }
     }

@@ -38,9 +38,9 @@
 pub mod blend;
 pub mod cave;
 pub mod certified;
+pub mod depth_sorter;
 pub mod footprint;
 pub mod measure;
-pub mod order;
 pub mod pages;
 pub mod parts;
 pub mod sequence;
@@ -61,25 +61,27 @@ use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
 use self::footprint::Footprint;
 use self::measure::Errors;
-use self::pages::{Gaze, Grid, Pages, Row};
+use self::pages::{Grid, Pages, Row, TraversalDirection};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::{Radial, above_m};
-use self::walk::{Ground, Stream, Worker};
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, widened};
-use crate::draw::{Draw, DrawList, Draws, Geometry, Hiding, Instance, Limits, Manner, Source, Topology};
+use self::walk::{Stream, WalkContext, Worker};
+use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
+use crate::draw::{
+    DepthMode, Draw, DrawKinds, DrawList, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
+};
 use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, Lens, View};
 
 /// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
 /// widened.
-const MOST_TRIANGLES: usize = 1 << 21;
+const MAX_TRIANGLES: usize = 1 << 21;
 /// The most pages: beyond it they are made larger.
-const MOST_PAGES: u64 = 1 << 16;
+const MAX_PAGES: u64 = 1 << 16;
 /// Triangles of the frame before from which on rows are walked on all cores: for fewer it takes longer to share them out.
-const LEAST_PARALLEL: usize = 20_000;
+const MIN_PARALLEL: usize = 20_000;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -149,7 +151,7 @@ pub const ENTRY: Entry = Entry {
         Need { key: "edge", other: "level", words: &["uniform"] },
         Need { key: "blend", other: "level", words: &["uniform"] },
     ],
-    most_samples: u64::MAX,
+    max_samples: u64::MAX,
     // The walk has a mark for each sample along a row of pages.
     max_side: 1 << 22,
     takes_endless: false,
@@ -183,14 +185,14 @@ struct SortedStrips {
     /// Of the last frame.
     triangles_before: usize,
     /// Indices of a frame as they are walked: three a triangle.
-    most_indices: usize,
+    max_indices: usize,
     limits: Limits,
     nothing: Geometry,
 }
 
 impl SortedStrips {
     fn new(field: Arc<Field>, settings: &Settings) -> Self {
-        let grid = Grid::new(&field, (settings.number("page") as u32).ilog2(), MOST_PAGES);
+        let grid = Grid::new(&field, (settings.number("page") as u32).ilog2(), MAX_PAGES);
         let cells = grid.side() as usize;
         let pages = (grid.count[0] * grid.count[1]) as usize;
         let topology = topology::of(settings.word("topology"));
@@ -200,17 +202,17 @@ impl SortedStrips {
         let comes_in_parts = level_is_certified && topology == Topology::Triangles && sequence != Sequence::Shuffled;
         let parts = if comes_in_parts { settings.number("parts") as usize } else { 1 };
         let [vertices, triangles] = if parts > 1 {
-            [parts::most_triangles(pages, pages * cells * cells / 3); 2]
+            [parts::max_triangles(pages, pages * cells * cells / 3); 2]
         } else {
             [pages * (cells + 1) * (cells + 1), 2 * pages * cells * cells]
         };
-        let most_indices = 3 * triangles.min(MOST_TRIANGLES);
+        let max_indices = 3 * triangles.min(MAX_TRIANGLES);
         let rows = grid.count[0].max(grid.count[1]) as usize;
         let limits = Limits {
             draws: rows,
             instances: rows,
-            vertices: vertices.min(MOST_TRIANGLES),
-            indices: topology::most_indices(topology, most_indices),
+            vertices: vertices.min(MAX_TRIANGLES),
+            indices: topology::max_indices(topology, max_indices),
             ..Limits::default()
         };
         Self {
@@ -230,7 +232,7 @@ impl SortedStrips {
             part: DrawList::default(),
             is_serial: settings.variant() == Some("serial"),
             triangles_before: 0,
-            most_indices,
+            max_indices,
             limits,
             nothing: Geometry::default(),
         }
@@ -245,7 +247,7 @@ impl SortedStrips {
             Footprint::new(field, view, range).visit_pages(&grid, |at| {
                 let page = errors.square(grid.level, at);
                 let bounds = bounds(field, grid.level, at, page.range);
-                if errors.has_land(at) && frustum.contains(&bounds) != Containment::Outside {
+                if errors.has_terrain(at) && frustum.contains(&bounds) != Containment::Outside {
                     seen.push(at);
                 }
             });
@@ -264,15 +266,21 @@ impl SortedStrips {
 
     /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the only one;
     /// how many vertices and indices each has. `None` if they would not fit the limits.
-    fn walk(&self, levels: &impl Levels, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<[usize; 2]>> {
+    fn walk(
+        &self,
+        levels: &impl Levels,
+        traversal: &TraversalDirection,
+        rows: &[Row],
+        workers: &mut [Worker],
+    ) -> Option<Vec<[usize; 2]>> {
         let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
-        let ground = Ground { field, pages, levels, shapes, gaze: *gaze, blend: self.blend };
+        let context = WalkContext { field, pages, levels, shapes, traversal: *traversal, blend: self.blend };
         let has_room =
-            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.most_indices;
+            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.max_indices;
         if let [worker] = workers {
             let walk = |row: &Row| {
                 let before = worker.stream.lengths();
-                ground.walk_on(row, worker);
+                context.walk_on(row, worker);
                 let after = worker.stream.lengths();
                 has_room(after).then(|| [0, 1].map(|k| after[k] - before[k]))
             };
@@ -284,7 +292,7 @@ impl SortedStrips {
             if !has_room(sums.each_ref().map(|sum| sum.load(Relaxed))) {
                 return None;
             }
-            ground.walk_on(row, worker);
+            context.walk_on(row, worker);
             let own = worker.stream.lengths();
             has_room([0, 1].map(|k| sums[k].fetch_add(own[k], Relaxed) + own[k])).then_some(own)
         };
@@ -292,16 +300,22 @@ impl SortedStrips {
     }
 
     /// The frame's strips under the view's tolerance, as [`Self::walk`] leaves them.
-    fn strips(&mut self, view: &View, gaze: &Gaze, rows: &[Row], workers: &mut [Worker]) -> Option<Vec<[usize; 2]>> {
+    fn strips(
+        &mut self,
+        view: &View,
+        traversal: &TraversalDirection,
+        rows: &[Row],
+        workers: &mut [Worker],
+    ) -> Option<Vec<[usize; 2]>> {
         for worker in &mut *workers {
             worker.stream.clear();
         }
         if let Some(edge) = self.edge {
             let edge_px = edge * view.tolerance.px;
             let levels = Radial::uniform(&self.field, view, edge_px, self.pages.grid.level, self.blend);
-            return self.walk(&levels, gaze, rows, workers);
+            return self.walk(&levels, traversal, rows, workers);
         }
-        if self.split(view) { self.walk(&self.splits, gaze, rows, workers) } else { None }
+        if self.split(view) { self.walk(&self.splits, traversal, rows, workers) } else { None }
     }
 
     /// Splits the squares that the view's tolerance needs split; `false` if there are too many.
@@ -309,21 +323,21 @@ impl SortedStrips {
         self.splits.clear();
         let seen = guarded(view, self.guard);
         // A split square has at least six triangles more.
-        let most = self.most_indices / 18 + 1;
-        Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], most).split(&mut self.splits)
+        let max = self.max_indices / 18 + 1;
+        Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], max).split(&mut self.splits)
     }
 
     /// Splits what the view's tolerance needs; whether the frame fits its limits whatever comes of that.
     fn surely_fits(&mut self, view: &View) -> bool {
         let fits = self.split(view);
-        let most = parts::most_triangles(self.pages.list().len(), self.splits.count());
-        fits && 3 * most <= self.most_indices && most <= self.limits.vertices
+        let max = parts::max_triangles(self.pages.list().len(), self.splits.count());
+        fits && 3 * max <= self.max_indices && max <= self.limits.vertices
     }
 
     /// Walks group after group of rows; what is to be walked was split.
     fn fill_in_parts(
         &mut self,
-        (gaze, rows): (&Gaze, &[Row]),
+        (traversal, rows): (&TraversalDirection, &[Row]),
         workers: &mut [Worker],
         list: &mut DrawList,
         ready: &mut dyn FnMut(&DrawList),
@@ -332,7 +346,7 @@ impl SortedStrips {
         let groups = parts::groups(rows, self.parts, self.sequence);
         for (k, group) in groups.iter().enumerate() {
             workers.iter_mut().for_each(|worker| worker.stream.clear());
-            let lengths = self.walk(&self.splits, gaze, group, workers).expect("room for all that may come");
+            let lengths = self.walk(&self.splits, traversal, group, workers).expect("room for all that may come");
             part.clear();
             self.fill(&lengths, workers, &mut part);
             parts::append(&part, list);
@@ -395,18 +409,19 @@ impl Technique for SortedStrips {
     fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
         self.look(view);
         list.reach_m = self.reach_m(view);
-        let gaze = Gaze::new(&self.field, view);
-        let rows = self.pages.rows(&gaze);
+        let traversal = TraversalDirection::new(&self.field, view);
+        let rows = self.pages.rows(&traversal);
         let mut workers = std::mem::take(&mut self.workers);
         workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
-        let is_serial = self.is_serial || self.triangles_before < LEAST_PARALLEL;
+        let is_serial = self.is_serial || self.triangles_before < MIN_PARALLEL;
         let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
         if self.parts > 1 && self.surely_fits(view) {
-            self.fill_in_parts((&gaze, &rows), of_frame, list, ready);
+            self.fill_in_parts((&traversal, &rows), of_frame, list, ready);
         } else {
-            let (lengths, widening) = widened(view, |wider| self.strips(wider, &gaze, &rows, of_frame));
+            let (lengths, tolerance_scale) =
+                select_within_limits(view, |wider| self.strips(wider, &traversal, &rows, of_frame));
             self.fill(&lengths, of_frame, list);
-            list.widening = widening;
+            list.tolerance_scale = tolerance_scale;
         }
         self.workers = workers;
         self.triangles_before = list.triangles() as usize;
@@ -416,15 +431,15 @@ impl Technique for SortedStrips {
         self.edge.is_none()
     }
 
-    fn manner(&self) -> Manner {
-        let draws = Draws::explicit(self.topology);
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        let draws = DrawKinds::explicit(self.topology);
         // Where vertices slide the order is not that of every ray.
         let is_in_order = !matches!(self.blend, Blend::End(_));
-        let hiding = if is_in_order { self.sequence.hiding() } else { Hiding::ByDepth };
-        Manner { draws, hiding, ..Manner::default() }
+        let depth_mode = if is_in_order { self.sequence.depth_mode() } else { DepthMode::Buffer };
+        PipelineRequirements { draws, depth_mode, ..PipelineRequirements::default() }
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let pages = self.pages.grid.count.map(f64::from);
         vec![
             ("pages", pages[0] * pages[1], ""),

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::order::Crossing;
+use super::depth_sorter::Crossing;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
@@ -23,11 +23,11 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Pages of at least 2^level cells a side, larger ones where there would be more than `most`.
-    pub fn new(field: &Field, level: u32, most: u64) -> Self {
+    /// Pages of at least 2^level cells a side, larger ones where there would be more than `max`.
+    pub fn new(field: &Field, level: u32, max: u64) -> Self {
         let last = field.size().map(|n| n as i32 - 1);
         let count = |level: u32| last.map(|n| (n as u32).div_ceil(1 << level));
-        let fits = |level: &u32| count(*level).iter().map(|&n| u64::from(n)).product::<u64>() <= most;
+        let fits = |level: &u32| count(*level).iter().map(|&n| u64::from(n)).product::<u64>() <= max;
         let level = (level..31).find(fits).unwrap_or(30);
         Self { level, count: count(level), last }
     }
@@ -85,30 +85,30 @@ impl Pages {
     }
 
     /// The rows of pages to walk, nearest first.
-    pub fn rows(&self, gaze: &Gaze) -> Vec<Row> {
-        let (major, side) = (gaze.major, f64::from(self.grid.side()));
+    pub fn rows(&self, traversal: &TraversalDirection) -> Vec<Row> {
+        let (major, side) = (traversal.major, f64::from(self.grid.side()));
         let wanted: Vec<bool> = (0..self.grid.count[major] as i32)
             .map(|row| (0..self.grid.count[1 - major] as i32).any(|n| self.is_drawn(placed(major, row, n))))
             .collect();
-        let eye_row = (gaze.eye[major] / side).floor();
-        let outward = outward(eye_row, gaze.ahead[major], wanted.len() as i32);
+        let eye_row = (traversal.eye[major] / side).floor();
+        let outward = outward(eye_row, traversal.ahead[major], wanted.len() as i32);
         let rows = outward.filter(|&(row, _)| wanted[row as usize]);
         rows.map(|(row, sign)| Row {
             row,
             sign,
-            runs: self.runs(gaze, row),
+            runs: self.runs(traversal, row),
             // The row behind the first one of each direction is drawn later, or is the first one.
             has_behind: f64::from(row) != eye_row.clamp(0.0, (wanted.len() - 1) as f64),
         })
         .collect()
     }
 
-    fn runs(&self, gaze: &Gaze, row: i32) -> Vec<Run> {
-        let (major, minor) = (gaze.major, 1 - gaze.major);
+    fn runs(&self, traversal: &TraversalDirection, row: i32) -> Vec<Run> {
+        let (major, minor) = (traversal.major, 1 - traversal.major);
         let count = self.grid.count[minor] as i32;
-        let eye_column = (gaze.eye[minor] / f64::from(self.grid.side())).floor();
+        let eye_column = (traversal.eye[minor] / f64::from(self.grid.side())).floor();
         let mut runs: Vec<Run> = Vec::new();
-        for (column, sign) in outward(eye_column, gaze.ahead[minor], count) {
+        for (column, sign) in outward(eye_column, traversal.ahead[minor], count) {
             if !self.is_drawn(placed(major, row, column)) {
                 continue;
             }
@@ -172,7 +172,7 @@ pub struct Run {
 
 /// Where the eye is over the lattice and where it looks: what the order depends on.
 #[derive(Clone, Copy, Debug)]
-pub struct Gaze {
+pub struct TraversalDirection {
     /// The direction nearest the view's, along which strips follow each other: 0 along x, 1 along z.
     pub major: usize,
     /// Where rays come from, samples. Parallel ones come from far away.
@@ -186,7 +186,7 @@ pub struct Gaze {
 /// Where parallel rays are said to come from, in the field's sizes.
 const FAR: f64 = 1e9;
 
-impl Gaze {
+impl TraversalDirection {
     /// That of a view of a field.
     pub fn new(field: &Field, view: &View) -> Self {
         let forward = [view.forward().x, view.forward().z];
@@ -244,8 +244,8 @@ mod tests {
         let grid = Grid { level: 4, count: [9, 2], last: [140, 31] };
         let mut pages = Pages::none(grid);
         pages.set([0, 1, 3, 4, 5, 6, 8].map(|x| [x, 1]));
-        let gaze = Gaze { major: 1, eye: [70.0, -100.0], ahead: [1, 1], against: [false; 2] };
-        let rows = pages.rows(&gaze);
+        let traversal = TraversalDirection { major: 1, eye: [70.0, -100.0], ahead: [1, 1], against: [false; 2] };
+        let rows = pages.rows(&traversal);
         let run = |first, pages, sign| Run { first, pages, sign };
         assert_eq!(rows.len(), 1);
         assert_eq!((rows[0].row, rows[0].sign, rows[0].has_behind), (1, 1, true));

@@ -12,7 +12,7 @@ use crate::draw::{Draw, DrawList, Instance};
 /// The most triangles of a frame of so many pages with so many split squares, and the most vertices: a page has four, a
 /// split adds at most the middles of a square and of its sides, there are less than twice as many triangles, and rows of
 /// pages have the vertices between them twice.
-pub fn most_triangles(pages: usize, splits: usize) -> usize {
+pub fn max_triangles(pages: usize, splits: usize) -> usize {
     2 * (4 * pages + 5 * splits)
 }
 

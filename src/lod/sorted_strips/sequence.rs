@@ -15,7 +15,7 @@
 //! take 2.1 times the device's time (2049 × 2049 samples, circle, 1 px, 640 × 360, 795 000 triangles, medians of three
 //! rounds: 111 to 124 ms as a list, 221 to 252 ms as strips), and selection a tenth more.
 
-use crate::draw::{DrawList, Hiding};
+use crate::draw::{DepthMode, DrawList};
 
 /// An order of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +45,8 @@ impl Sequence {
     }
 
     /// What keeps hidden land out of the picture.
-    pub fn hiding(self) -> Hiding {
-        if self == Self::Painter { Hiding::ByOrder } else { Hiding::ByDepth }
+    pub fn depth_mode(self) -> DepthMode {
+        if self == Self::Painter { DepthMode::Painter } else { DepthMode::Buffer }
     }
 
     /// Whether the furthest row comes first.
@@ -124,7 +124,7 @@ mod tests {
     fn every_word_is_an_order_of_its_own() {
         let all: Vec<_> = Sequence::WORDS.iter().map(|word| Sequence::of(word)).collect();
         assert!(all.iter().enumerate().all(|(k, one)| !all[..k].contains(one)));
-        let without = |word: &&&str| Sequence::of(word).hiding() == Hiding::ByOrder;
+        let without = |word: &&&str| Sequence::of(word).depth_mode() == DepthMode::Painter;
         assert_eq!(Sequence::WORDS.iter().filter(without).collect::<Vec<_>>(), [&"painter"]);
     }
 

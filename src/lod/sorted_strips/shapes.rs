@@ -173,12 +173,12 @@ impl Shape {
             behind[far] |= 1 << near;
         }
         // The triangles and their seams form a tree: in each round one is free.
-        let mut waiting = (1u8 << self.triangles.len()) - 1;
-        while waiting != 0 {
+        let mut pending = (1u8 << self.triangles.len()) - 1;
+        while pending != 0 {
             for (k, triangle) in self.triangles.iter().enumerate() {
-                if waiting >> k & 1 == 1 && behind[k] & waiting == 0 {
+                if pending >> k & 1 == 1 && behind[k] & pending == 0 {
                     visit(*triangle);
-                    waiting &= !(1 << k);
+                    pending &= !(1 << k);
                 }
             }
         }

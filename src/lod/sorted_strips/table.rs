@@ -32,13 +32,13 @@ impl Table {
     }
 
     /// Levels that double with the distance, so that triangles are as large on the screen: `unit_m` metres away is
-    /// level 1, up to `most`. The table reaches further by `more_m`, for repairs. Its entries are those of any larger
+    /// level 1, up to `max`. The table reaches further by `more_m`, for repairs. Its entries are those of any larger
     /// unit or divide them, so that a smaller unit never gives a finer level.
-    pub fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
-        let scale = doubling_scale(unit_m, most, more_m);
+    pub fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
+        let scale = doubling_scale(unit_m, max, more_m);
         let level = |k: usize| {
             let distance = doublings(k, scale, unit_m);
-            (0..most).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
+            (0..max).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
         };
         Self { levels: (0..ENTRIES).map(level).collect(), scale }
     }
@@ -49,18 +49,18 @@ impl Table {
         u32::from(self.levels[((squared_m2 * self.scale) as usize).min(self.levels.len() - 1)])
     }
 
-    /// The first level, from 1 to `most`, at which the table breaks its condition for cells of this diagonal
+    /// The first level, from 1 to `max`, at which the table breaks its condition for cells of this diagonal
     /// (metres); `None` if it keeps it. Levels must rise with the distance, and none may begin before squares that
     /// touch those with the level before the last one have ended.
-    pub fn broken_at(&self, diagonal_m: f64, most: u32) -> Option<u32> {
+    pub fn broken_at(&self, diagonal_m: f64, max: u32) -> Option<u32> {
         let falls = self.levels.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| u32::from(pair[0]));
-        let steps = Steps::of(self, most);
-        falls.or_else(|| (2..=most).find(|&level| !steps.begins_at(level, steps.least_m(level, diagonal_m))))
+        let steps = Steps::of(self, max);
+        falls.or_else(|| (2..=max).find(|&level| !steps.begins_at(level, steps.min_m(level, diagonal_m))))
     }
 
     /// Lowers levels where they break the condition, and nowhere else.
-    pub fn repair(&mut self, diagonal_m: f64, most: u32) {
-        let begins = Steps::of(self, most).repaired(diagonal_m).begins;
+    pub fn repair(&mut self, diagonal_m: f64, max: u32) {
+        let begins = Steps::of(self, max).repaired(diagonal_m).begins;
         for (k, level) in self.levels.iter_mut().enumerate() {
             *level = begins.iter().rposition(|&begin| begin <= k).unwrap_or(0) as u8;
         }
@@ -77,32 +77,32 @@ struct Steps {
 }
 
 impl Steps {
-    /// From where on every level of a table is at least this one, up to `most`.
-    fn of(table: &Table, most: u32) -> Self {
+    /// From where on every level of a table is at least this one, up to `max`.
+    fn of(table: &Table, max: u32) -> Self {
         let begin = |level: u32| table.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1);
-        Self { begins: (0..=most).map(begin).collect(), scale: table.scale, entries: table.levels.len() }
+        Self { begins: (0..=max).map(begin).collect(), scale: table.scale, entries: table.levels.len() }
     }
 
     /// Those of [`Table::doubling`], without making it.
-    fn doubling(unit_m: f64, most: u32, more_m: f64) -> Self {
-        let scale = doubling_scale(unit_m, most, more_m);
+    fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
+        let scale = doubling_scale(unit_m, max, more_m);
         let begin = |level: u32| {
-            let least = f64::from((1u32 << level) >> 1);
+            let min = f64::from((1u32 << level) >> 1);
             // Rounding may be off by one on either side.
-            let about = ((unit_m * least).powi(2) * scale) as usize;
-            let begins = |k: &usize| level == 0 || doublings(*k, scale, unit_m) >= least;
+            let about = ((unit_m * min).powi(2) * scale) as usize;
+            let begins = |k: &usize| level == 0 || doublings(*k, scale, unit_m) >= min;
             (about.saturating_sub(1)..ENTRIES).find(begins).unwrap_or(ENTRIES)
         };
-        Self { begins: (0..=most).map(begin).collect(), scale, entries: ENTRIES }
+        Self { begins: (0..=max).map(begin).collect(), scale, entries: ENTRIES }
     }
 
     /// Levels begin later where they break the condition.
     fn repaired(mut self, diagonal_m: f64) -> Self {
         for level in 1..self.begins.len() {
-            let least_m = self.least_m(level as u32, diagonal_m);
-            if !self.begins_at(level as u32, least_m) {
-                let least = (least_m * least_m * self.scale).ceil().min(self.entries as f64) as usize;
-                self.begins[level] = self.begins[level].max(least);
+            let min_m = self.min_m(level as u32, diagonal_m);
+            if !self.begins_at(level as u32, min_m) {
+                let min = (min_m * min_m * self.scale).ceil().min(self.entries as f64) as usize;
+                self.begins[level] = self.begins[level].max(min);
             }
         }
         self
@@ -119,21 +119,21 @@ impl Steps {
 
     /// Where a level must not begin before, metres: one diagonal of a square of the one before it further than that
     /// begins, so that squares touching the last ones split at it are split too.
-    fn least_m(&self, level: u32, diagonal_m: f64) -> f64 {
+    fn min_m(&self, level: u32, diagonal_m: f64) -> f64 {
         // Nothing is split where the level before holds everywhere.
         let is_needed = level > 1 && self.begins[level as usize - 1] > 0;
         if is_needed { self.distance_m(level - 1) + diagonal_m * f64::from(1u32 << (level - 1)) } else { 0.0 }
     }
 
     /// Whether a level begins at a distance or beyond it, but for rounding.
-    fn begins_at(&self, level: u32, least_m: f64) -> bool {
-        self.distance_m(level) >= least_m * (1.0 - 1e-12)
+    fn begins_at(&self, level: u32, min_m: f64) -> bool {
+        self.distance_m(level) >= min_m * (1.0 - 1e-12)
     }
 }
 
 /// Entries per square metre of a table that reaches as far as it must: a power of four.
-fn doubling_scale(unit_m: f64, most: u32, more_m: f64) -> f64 {
-    let reach_m = unit_m * f64::from(1u32 << most.saturating_sub(1)) + more_m;
+fn doubling_scale(unit_m: f64, max: u32, more_m: f64) -> f64 {
+    let reach_m = unit_m * f64::from(1u32 << max.saturating_sub(1)) + more_m;
     0.25f64.powf((reach_m / ((ENTRIES - 1) as f64).sqrt()).log2().ceil())
 }
 
@@ -160,19 +160,19 @@ pub struct Radial {
 }
 
 impl Radial {
-    /// Triangles whose short sides are about `edge_px` pixels long on the screen, up to level `most`; the table is
-    /// repaired if it must be. Vertices of levels below `most` go over into the next level as `blend` says.
-    pub fn uniform(field: &Field, view: &View, edge_px: f64, most: u32, blend: Blend) -> Self {
+    /// Triangles whose short sides are about `edge_px` pixels long on the screen, up to level `max`; the table is
+    /// repaired if it must be. Vertices of levels below `max` go over into the next level as `blend` says.
+    pub fn uniform(field: &Field, view: &View, edge_px: f64, max: u32, blend: Blend) -> Self {
         let [dx, dz] = field.spacing;
         let sample_px = view.focal_px() * dx.max(dz);
         let steps = match view.lens {
             Lens::Perspective { .. } => {
-                Steps::doubling(2.0 * sample_px / edge_px, most, dx.hypot(dz) * f64::from(2u32 << most))
+                Steps::doubling(2.0 * sample_px / edge_px, max, dx.hypot(dz) * f64::from(2u32 << max))
             }
             // The same level everywhere.
             Lens::Orthographic { .. } => {
-                let level = (0..most).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8;
-                Steps::of(&Table::new(vec![level], 0.0), most)
+                let level = (0..max).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8;
+                Steps::of(&Table::new(vec![level], 0.0), max)
             }
         };
         // A vertex that slides is in a square of the next level, as are the ends between which it does. That square begins
@@ -180,12 +180,12 @@ impl Radial {
         // which they stand is as deep.
         let diagonals = if matches!(blend, Blend::End(_)) { 2.0 } else { 1.0 };
         let radial = Self::of(field, view, &steps.repaired(diagonals * dx.hypot(dz)));
-        if blend == Blend::Off { radial } else { radial.blending(most) }
+        if blend == Blend::Off { radial } else { radial.blending(max) }
     }
 
-    /// A table up to level `most` that keeps its condition, seen from the view's eye.
-    pub fn new(field: &Field, view: &View, table: &Table, most: u32) -> Self {
-        Self::of(field, view, &Steps::of(table, most))
+    /// A table up to level `max` that keeps its condition, seen from the view's eye.
+    pub fn new(field: &Field, view: &View, table: &Table, max: u32) -> Self {
+        Self::of(field, view, &Steps::of(table, max))
     }
 
     fn of(field: &Field, view: &View, steps: &Steps) -> Self {
@@ -202,9 +202,9 @@ impl Radial {
         }
     }
 
-    fn blending(mut self, most: u32) -> Self {
+    fn blending(mut self, max: u32) -> Self {
         let distance_m = |begin: &f64| if *begin > 0.0 { (begin / self.scale).sqrt() } else { 0.0 };
-        self.begins_m = self.begins[..=most as usize].iter().map(distance_m).collect();
+        self.begins_m = self.begins[..=max as usize].iter().map(distance_m).collect();
         self
     }
 }
@@ -299,18 +299,18 @@ mod tests {
             tolerance: crate::view::Tolerance { px: 1.0, metric: crate::view::Metric::Certified },
             time_s: 0.0,
         };
-        for (unit_m, most, more_m) in [(10.0, 5, 1.0), (3.7, 6, 40.0), (0.01, 4, 9.0), (1e5, 8, 700.0), (1.0, 1, 0.5)] {
-            let mut table = Table::doubling(unit_m, most, more_m);
-            let steps = Steps::doubling(unit_m, most, more_m);
-            assert_eq!(steps, Steps::of(&table, most), "unit {unit_m} m");
-            table.repair(0.3 * unit_m, most);
+        for (unit_m, max, more_m) in [(10.0, 5, 1.0), (3.7, 6, 40.0), (0.01, 4, 9.0), (1e5, 8, 700.0), (1.0, 1, 0.5)] {
+            let mut table = Table::doubling(unit_m, max, more_m);
+            let steps = Steps::doubling(unit_m, max, more_m);
+            assert_eq!(steps, Steps::of(&table, max), "unit {unit_m} m");
+            table.repair(0.3 * unit_m, max);
             let repaired = steps.repaired(0.3 * unit_m);
-            assert_eq!(repaired, Steps::of(&table, most), "unit {unit_m} m");
+            assert_eq!(repaired, Steps::of(&table, max), "unit {unit_m} m");
             let radial = Radial::of(&field, &view, &repaired);
             for entry in 0..ENTRIES + 100 {
                 let squared_m2 = (entry as f64 + 0.5) / table.scale;
                 let is_split = |level: usize| squared_m2 * radial.scale < radial.begins[level];
-                for level in 1..=most {
+                for level in 1..=max {
                     assert_eq!(is_split(level as usize), table.level(squared_m2) < level, "entry {entry}, {level}");
                 }
             }

@@ -14,7 +14,7 @@ pub fn of(word: &str) -> Topology {
 }
 
 /// Indices that so many indices of a list become at most: three a triangle, and two ends.
-pub fn most_indices(topology: Topology, list: usize) -> usize {
+pub fn max_indices(topology: Topology, list: usize) -> usize {
     if topology == Topology::Strip { list / 3 * 5 } else { list }
 }
 
@@ -93,7 +93,7 @@ mod tests {
         let strips = strips(list);
         let made: Vec<_> = triangles(&strips).into_iter().map(from_lowest).collect();
         assert_eq!(made, list.iter().copied().map(from_lowest).collect::<Vec<_>>());
-        assert!(strips.len() <= most_indices(Topology::Strip, 3 * list.len()));
+        assert!(strips.len() <= max_indices(Topology::Strip, 3 * list.len()));
         for (k, _) in strips.windows(2).enumerate().filter(|(_, pair)| pair[0] == RESTART && pair[1] != RESTART) {
             assert_eq!(k % 2, 1, "a strip begins at an even place");
         }

@@ -26,8 +26,8 @@
 //! vertices are made again, as the paper copies them from page to page.
 
 use super::blend::Blend;
-use super::order::{Crossing, Order};
-use super::pages::{Gaze, Pages, Row, Run, placed};
+use super::depth_sorter::{Crossing, DepthSorter};
+use super::pages::{Pages, Row, Run, TraversalDirection, placed};
 use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
 use super::splits::Levels;
 use crate::draw::ExplicitVertex;
@@ -62,11 +62,11 @@ pub struct Worker {
     pub stream: Stream,
     marks: Vec<Mark>,
     start: Vec<u32>,
-    order: Order,
+    sorter: DepthSorter,
 }
 
 /// What every row of a frame is walked with.
-pub struct Ground<'a, L> {
+pub struct WalkContext<'a, L> {
     /// The field.
     pub field: &'a Field,
     /// The pages to be drawn.
@@ -76,7 +76,7 @@ pub struct Ground<'a, L> {
     /// All kinds of quads.
     pub shapes: &'a Shapes,
     /// Where the eye is and looks.
-    pub gaze: Gaze,
+    pub traversal: TraversalDirection,
     /// How vertices go over into the next level.
     pub blend: Blend,
 }
@@ -126,7 +126,7 @@ struct Side {
 
 /// The run that is being walked.
 struct Walk<'a, L> {
-    ground: &'a Ground<'a, L>,
+    context: &'a WalkContext<'a, L>,
     stream: Stream,
     /// The row's first vertex in the stream: indices count from it.
     first_vertex: usize,
@@ -136,7 +136,7 @@ struct Walk<'a, L> {
     signs: [i32; 2],
     /// Where rays come from, counted from the first corner, and which of them the walk is not away from.
     crossing: Crossing,
-    order: Order,
+    sorter: DepthSorter,
     /// Length of the run.
     length: i32,
     /// By column.
@@ -152,7 +152,7 @@ struct Walk<'a, L> {
     is_moved: bool,
 }
 
-impl<L: Levels> Ground<'_, L> {
+impl<L: Levels> WalkContext<'_, L> {
     /// Walks a row of pages.
     pub fn walk(&self, row: &Row) -> Stream {
         let mut worker = Worker::default();
@@ -166,13 +166,13 @@ impl<L: Levels> Ground<'_, L> {
         let behind = |sign: i32, n: i32| (if sign > 0 { n } else { n + 1 }) * side;
         let longest = row.runs.iter().map(|run| run.pages * side).max().unwrap_or(0);
         let mut walk = Walk {
-            ground: self,
+            context: self,
             first_vertex: worker.stream.vertices.len(),
             stream: std::mem::take(&mut worker.stream),
             origin: [0, behind(row.sign, row.row)],
             signs: [0, row.sign],
             crossing: Crossing::default(),
-            order: std::mem::take(&mut worker.order),
+            sorter: std::mem::take(&mut worker.sorter),
             length: 0,
             marks: std::mem::take(&mut worker.marks),
             start: std::mem::take(&mut worker.start),
@@ -189,7 +189,7 @@ impl<L: Levels> Ground<'_, L> {
             walk.origin[0] = behind(run.sign, run.first);
             walk.signs[0] = run.sign;
             walk.length = run.pages * side;
-            walk.crossing = self.gaze.crossing(walk.origin, walk.signs);
+            walk.crossing = self.traversal.crossing(walk.origin, walk.signs);
             // Two runs away from the same side share its vertices.
             if last_start != Some(walk.origin[0]) {
                 walk.start.fill(UNMADE);
@@ -197,13 +197,13 @@ impl<L: Levels> Ground<'_, L> {
             last_start = Some(walk.origin[0]);
             walk.run(row, run);
         }
-        *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start, order: walk.order };
+        *worker = Worker { stream: walk.stream, marks: walk.marks, start: walk.start, sorter: walk.sorter };
     }
 }
 
 impl<L: Levels> Walk<'_, L> {
     fn run(&mut self, row: &Row, run: &Run) {
-        let Ground { pages, gaze: Gaze { major, .. }, .. } = *self.ground;
+        let WalkContext { pages, traversal: TraversalDirection { major, .. }, .. } = *self.context;
         let level = pages.grid.level;
         let page = |row: i32, column: i32| placed(major, row, column);
         // Positions grow with (u, v) or with (v, u).
@@ -213,7 +213,7 @@ impl<L: Levels> Walk<'_, L> {
             let end = if k == major { row.row } else { run.first.max(run.first + run.sign * (run.pages - 1)) } + 1;
             end * pages.grid.side() > pages.grid.last[k]
         });
-        self.is_moved = sticks_out || matches!(self.ground.blend, Blend::End(_));
+        self.is_moved = sticks_out || matches!(self.context.blend, Blend::End(_));
         self.marks[..=self.length as usize].fill(Mark { v: UNUSED, vertex: UNMADE });
         for n in 0..run.pages {
             if row.has_behind && pages.is_drawn(page(row.row - row.sign, run.first + n * run.sign)) {
@@ -223,7 +223,7 @@ impl<L: Levels> Walk<'_, L> {
         self.has_behind = row.has_behind;
         let side = Side { back: self.start_vertex(0), middle: None, front: self.start_vertex(pages.grid.side()) };
         self.strip(Square { level, column: 0, row: 0 }, side);
-        self.order.finish(&mut self.stream.indices);
+        self.sorter.finish(&mut self.stream.indices);
     }
 
     /// Marks the vertices of the front edges behind the row.
@@ -273,7 +273,7 @@ impl<L: Levels> Walk<'_, L> {
     /// Whether the square of twice the size that begins here need not be split.
     #[inline]
     fn is_parent_whole(&self, square: Square) -> bool {
-        square.column & 1 == 0 && square.level < self.ground.pages.grid.level && !self.is_split(square.parent())
+        square.column & 1 == 0 && square.level < self.context.pages.grid.level && !self.is_split(square.parent())
     }
 
     /// Whether the edge behind is that of a quad of twice the size: its front edge lacks the vertex between this
@@ -281,21 +281,22 @@ impl<L: Levels> Walk<'_, L> {
     #[inline]
     fn matches_coarser(&self, square: Square) -> bool {
         let (u, v) = ((square.column + 1) << square.level, square.row << square.level);
-        let begins = square.level < self.ground.pages.grid.level && square.column & 1 == 0 && square.row & 1 == 0;
-        begins && self.marks[u as usize].v != v && self.has_land_behind(u, v)
+        let begins = square.level < self.context.pages.grid.level && square.column & 1 == 0 && square.row & 1 == 0;
+        begins && self.marks[u as usize].v != v && self.has_terrain_behind(u, v)
     }
 
     /// Whether there is a quad behind a column of a strip: beyond the field's edge all are flat, and the page behind
     /// the row may not be drawn, or later.
     #[inline]
-    fn has_land_behind(&self, u: i32, v: i32) -> bool {
-        let Pages { grid, .. } = self.ground.pages;
-        let is_beyond = self.origin[1] + self.signs[1] * v >= grid.last[self.ground.gaze.major] && self.signs[1] < 0;
+    fn has_terrain_behind(&self, u: i32, v: i32) -> bool {
+        let Pages { grid, .. } = self.context.pages;
+        let is_beyond =
+            self.origin[1] + self.signs[1] * v >= grid.last[self.context.traversal.major] && self.signs[1] < 0;
         if v > 0 || is_beyond {
             return !is_beyond;
         }
         let [x, z] = self.world(Square { level: 0, column: u, row: -1 });
-        self.has_behind && self.ground.pages.is_drawn([x >> grid.level, z >> grid.level])
+        self.has_behind && self.context.pages.is_drawn([x >> grid.level, z >> grid.level])
     }
 
     /// The middle of a square's side on the run's first side, if either of its two squares is split.
@@ -318,7 +319,7 @@ impl<L: Levels> Walk<'_, L> {
         let middles = [(middle_behind, BACK), (trailing.middle, TRAILING), (middle, LEADING)];
         let mask = middles.iter().map(|(middle, bit)| if middle.is_some() { *bit } else { 0 }).sum();
         let [e, f, g] = middles.map(|(middle, _)| middle.unwrap_or(UNMADE));
-        let shape = self.ground.shapes.single(mask, self.is_rising(square));
+        let shape = self.context.shapes.single(mask, self.is_rising(square));
         self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, UNMADE], square, false);
         Side { back, middle, front }
     }
@@ -334,7 +335,7 @@ impl<L: Levels> Walk<'_, L> {
         let mut slots = [UNMADE; 8];
         slots[..4].copy_from_slice(&[trailing.back, back, front, trailing.front]);
         slots[slot::M] = middle;
-        self.push(self.ground.shapes.pair(), slots, square, true);
+        self.push(self.context.shapes.pair(), slots, square, true);
         Side { back, middle: None, front }
     }
 
@@ -346,9 +347,9 @@ impl<L: Levels> Walk<'_, L> {
         let (to_halves, [x, z]) = (2.0 / f64::from(size), self.crossing.eye);
         let eye = [(x - f64::from(u)) * to_halves, (z - f64::from(v)) * to_halves];
         if self.crossing.is_any() {
-            let page = self.ground.pages.grid.level;
+            let page = self.context.pages.grid.level;
             let first = self.stream.indices.len();
-            self.order.begin(&self.crossing, page, (level, [column, row]), is_pair, first);
+            self.sorter.begin(&self.crossing, page, (level, [column, row]), is_pair, first);
         }
         if self.is_moved {
             return self.push_moved(shape, slots, [u, v], size, eye);
@@ -362,7 +363,7 @@ impl<L: Levels> Walk<'_, L> {
     /// The same where vertices may lie elsewhere than in their shape: triangles without area are left out.
     #[cold]
     fn push_moved(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
-        let (major, unit) = (self.ground.gaze.major, f64::from(1 << self.ground.blend.fraction_bits()));
+        let (major, unit) = (self.context.traversal.major, f64::from(1 << self.context.blend.fraction_bits()));
         let (mirrored, Stream { vertices, indices }) = (self.mirrored, &mut self.stream);
         let vertices = &vertices[self.first_vertex..];
         let place = |vertex: &ExplicitVertex| {
@@ -391,7 +392,7 @@ impl<L: Levels> Walk<'_, L> {
 
     #[inline]
     fn is_split(&self, square: Square) -> bool {
-        self.ground.levels.is_split(square.level, self.world(square))
+        self.context.levels.is_split(square.level, self.world(square))
     }
 
     /// A square's place on the lattice.
@@ -401,7 +402,7 @@ impl<L: Levels> Walk<'_, L> {
             let first = self.origin[k] >> square.level;
             if self.signs[k] > 0 { first + n } else { first - 1 - n }
         };
-        placed(self.ground.gaze.major, place(1, square.row), place(0, square.column))
+        placed(self.context.traversal.major, place(1, square.row), place(0, square.column))
     }
 
     /// The vertex behind, if it is used.
@@ -436,9 +437,9 @@ impl<L: Levels> Walk<'_, L> {
     #[inline]
     fn vertex(&mut self, u: i32, v: i32) -> u32 {
         let [u, v] = [self.origin[0] + self.signs[0] * u, self.origin[1] + self.signs[1] * v];
-        let (at, last) = (placed(self.ground.gaze.major, v, u), self.ground.pages.grid.last);
+        let (at, last) = (placed(self.context.traversal.major, v, u), self.context.pages.grid.last);
         let position = [at[0].min(last[0]), at[1].min(last[1])];
-        self.stream.vertices.push(self.ground.vertex(position));
+        self.stream.vertices.push(self.context.vertex(position));
         (self.stream.vertices.len() - self.first_vertex) as u32 - 1
     }
 }

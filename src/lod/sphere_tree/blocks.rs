@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::lattice::{Lattice, Place};
 use crate::height::Field;
-use crate::height::surface::has_land;
+use crate::height::surface::has_terrain;
 use crate::view::{Aabb, Containment, View};
 
 /// A unit of culling and drawing: a block, or a square that the field's edge crosses.
@@ -38,7 +38,7 @@ pub struct Blocks {
 impl Blocks {
     /// The blocks of a field.
     pub fn new(field: &Field, lattice: &Lattice) -> Self {
-        if field.land().is_some() {
+        if field.procedural().is_some() {
             // Wedges tell themselves whether they are in sight.
             return Self { side: lattice.side(), ..Self::default() };
         }
@@ -120,7 +120,7 @@ fn squares(count: [i32; 2], last: Place, side: i32, edge_side: i32) -> Vec<Squar
 fn bounds(field: &Field, last: Place, side: i32, at: Place) -> Option<Aabb> {
     let first = at.map(|n| n * side);
     let end = [0, 1].map(|k| (first[k] + side).min(last[k]));
-    if !has_land(field, first, end) {
+    if !has_terrain(field, first, end) {
         return None;
     }
     let (mut lowest, mut highest) = (f32::INFINITY, f32::NEG_INFINITY);

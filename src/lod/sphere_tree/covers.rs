@@ -5,14 +5,14 @@
 //! Likewise a viewpoint inside B cannot leave A before it leaves B. So A *covers* B, or B covers A, until it is crossed
 //! or leaves the front. The lecture does not say how such pairs are found: here by a look from the viewpoint past the
 //! diamond, or short of it, at the wedge that is drawn there. What nothing covers is left to made-up spheres
-//! ([`Shells`]).
+//! ([`BoundingSpheres`]).
 
 use glam::DVec3;
 
-use super::front::{ByIndex, Front, Ticket, Watch};
+use super::bounding_spheres::BoundingSpheres;
+use super::front::{ByIndex, CrossingTracker, Front, TrackingHandle};
 use super::measure::Known;
 use super::reach::Viewpoint;
-use super::shells::Shells;
 
 /// Where to look, in distances of the diamond in plan: past one that may split, and short of one that may merge.
 const PAST: [f64; 2] = [1.5, 2.5];
@@ -21,31 +21,31 @@ const SHORT: [f64; 2] = [0.6, 0.3];
 /// Spheres that cover others, and made-up ones for the rest.
 #[derive(Default)]
 pub struct Covers {
-    shells: Shells,
+    bounding_spheres: BoundingSpheres,
     /// By the covering diamond: whom it covers.
-    covered: ByIndex<Vec<Ticket>>,
+    covered: ByIndex<Vec<TrackingHandle>>,
 }
 
-impl Watch for Covers {
+impl CrossingTracker for Covers {
     fn clear(&mut self) {
-        self.shells.clear();
+        self.bounding_spheres.clear();
         self.covered.clear();
     }
 
-    fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, visited: &mut usize) {
-        self.shells.due(from, tickets, visited);
+    fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, visited: &mut usize) {
+        self.bounding_spheres.due(from, handles, visited);
     }
 
-    fn place(&mut self, front: &mut Front, ticket: Ticket, known: &Known, is_split: bool, slack: f64) {
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, known: &Known, is_split: bool, slack: f64) {
         match cover(front, known, is_split) {
-            Some(cover) => self.covered.entry(cover).or_default().push(ticket),
-            None => self.shells.place(front, ticket, known, is_split, slack),
+            Some(cover) => self.covered.entry(cover).or_default().push(handle),
+            None => self.bounding_spheres.place(front, handle, known, is_split, slack),
         }
     }
 
-    fn left(&mut self, index: u64, tickets: &mut Vec<Ticket>) {
+    fn left(&mut self, index: u64, handles: &mut Vec<TrackingHandle>) {
         if let Some(covered) = self.covered.remove(&index) {
-            tickets.extend(covered);
+            handles.extend(covered);
         }
     }
 }

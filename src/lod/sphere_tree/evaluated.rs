@@ -19,7 +19,7 @@ use crate::height::bounds::ROUNDING;
 
 /// What is kept is in so many parts, so that few wait for each other, each of at most so many diamonds.
 const PARTS: usize = 64;
-const MOST_KEPT: usize = 1 << 15;
+const MAX_KEPT: usize = 1 << 15;
 
 /// A diamond's sizes, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub struct Size {
 
 /// Sizes of diamonds of a land.
 pub struct Evaluated {
-    land: Arc<Bezier>,
+    terrain: Arc<Bezier>,
     /// The most that single precision adds to a vertex's height, relative to its distance from the eye.
     pub rounding: f64,
     parts: Vec<RwLock<ByIndex<Size>>>,
@@ -42,10 +42,10 @@ pub struct Evaluated {
 
 impl Evaluated {
     /// Of a land whose vertices come at once, or fade in.
-    pub fn new(land: Arc<Bezier>, fades: bool) -> Self {
+    pub fn new(terrain: Arc<Bezier>, fades: bool) -> Self {
         // One rounding, or those of going from one height to another.
         let rounding = f64::from(if fades { ROUNDING } else { f32::EPSILON });
-        Self { land, rounding, parts: (0..PARTS).map(|_| RwLock::default()).collect() }
+        Self { terrain, rounding, parts: (0..PARTS).map(|_| RwLock::default()).collect() }
     }
 
     fn part(&self, index: usize) -> &RwLock<ByIndex<Size>> {
@@ -60,7 +60,7 @@ impl Evaluated {
         }
         let size = self.work_out(at);
         let mut part = part.write().unwrap_or_else(PoisonError::into_inner);
-        if part.len() == MOST_KEPT {
+        if part.len() == MAX_KEPT {
             part.clear();
         }
         part.insert(index as u64, size);
@@ -85,13 +85,13 @@ impl Evaluated {
         let half_m = f64::from(half) * SPACING_M;
         let (reach, longest_m) = if is_cell { (3.0, 8f64.sqrt() * half_m) } else { (2.0, 2.0 * half_m) };
         let place = at.map(|n| f64::from(n) * SPACING_M);
-        let bounds = self.land.bounds(&Area::about(place, reach * half_m), longest_m);
+        let bounds = self.terrain.bounds(&Area::about(place, reach * half_m), longest_m);
         let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
         let ball = (steps_m + bounds.way_m) * (1.0 + SPARE);
         // Corners are up to two balls further from the eye than what lies between them.
         let rounding_m = 2.0 * ball * self.rounding;
         Size {
-            height: self.land.height(place),
+            height: self.terrain.height(place),
             error: ((bounds.deviation_m + rounding_m) as f32).next_up(),
             ball: (ball as f32).next_up(),
         }
@@ -135,9 +135,9 @@ mod tests {
 
     /// Points sown densely over a diamond's wedges: within the error of its triangles as they are drawn, and in its ball.
     #[test]
-    fn the_land_is_within_a_diamond_s_error_at_every_depth() {
-        let land = Arc::new(Bezier::new(7, 24));
-        let (evaluated, mut dice) = (Evaluated::new(Arc::clone(&land), false), fastrand::Rng::with_seed(6));
+    fn the_terrain_is_within_a_diamond_s_error_at_every_depth() {
+        let terrain = Arc::new(Bezier::new(7, 24));
+        let (evaluated, mut dice) = (Evaluated::new(Arc::clone(&terrain), false), fastrand::Rng::with_seed(6));
         let lattice = Lattice::new([LATTICE as i32 - 1; 2]);
         for level in 0..29 {
             let mut worst = 0f64;
@@ -148,7 +148,7 @@ mod tests {
                 // Heights are relative to an eye beside the diamond.
                 let drawn = [apexes[0], ends[0], ends[1]].map(|p| {
                     let plan = p.map(|n| f64::from(n) * SPACING_M);
-                    [plan[0], plan[1], size.height + f64::from((land.height(plan) - size.height) as f32)]
+                    [plan[0], plan[1], size.height + f64::from((terrain.height(plan) - size.height) as f32)]
                 });
                 for _ in 0..100 {
                     let (mut u, mut v) = (dice.f64(), dice.f64());
@@ -157,7 +157,7 @@ mod tests {
                     }
                     let [a, b, c] = drawn;
                     let [x, z, y] = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
-                    let height = land.height([x, z]);
+                    let height = terrain.height([x, z]);
                     assert!((height - y).abs() <= f64::from(size.error), "level {level}: {size:?}");
                     let middle = at.map(|n| f64::from(n) * SPACING_M);
                     let from_middle = (x - middle[0]).hypot(z - middle[1]).hypot(height - size.height);

@@ -2,7 +2,7 @@
 //!
 //! What may change is the *front*: split diamonds of which no child has split, which may merge, and diamonds whose
 //! parents all have, which may split. All others wait behind them, since spheres are nested. Who looks after the front
-//! ([`Watch`]) says which of it the viewpoint may have crossed.
+//! ([`CrossingTracker`]) says which of it the viewpoint may have crossed.
 //!
 //! Diamonds looked at and time for a frame's changes, medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m above
 //! ground, one core. ROAM's priorities wait for the viewpoint's largest speed, as published: 5 m a frame.
@@ -31,7 +31,7 @@ use super::splits::{Changes, Found, Splits};
 
 /// A place in the front at one time: index of the diamond and when it got its watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Ticket {
+pub struct TrackingHandle {
     /// Index of the diamond.
     pub index: u64,
     /// No two tickets have the same.
@@ -85,44 +85,44 @@ pub struct Front<'a> {
 }
 
 /// Who looks after the front.
-pub trait Watch: Default + Send {
+pub trait CrossingTracker: Default + Send {
     /// Forgets all tickets.
     fn clear(&mut self);
 
     /// The viewpoint is now here: gives back the tickets of all that it may have crossed, maybe with stale ones.
-    fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, visited: &mut usize);
+    fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, visited: &mut usize);
 
     /// Looks after a member that the eye may move `slack` metres (above 0, finite) without crossing.
-    fn place(&mut self, front: &mut Front, ticket: Ticket, known: &Known, is_split: bool, slack: f64);
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, known: &Known, is_split: bool, slack: f64);
 
     /// A member has left: gives back the tickets of those that relied on it.
-    fn left(&mut self, _index: u64, _tickets: &mut Vec<Ticket>) {}
+    fn left(&mut self, _index: u64, _handles: &mut Vec<TrackingHandle>) {}
 }
 
 /// A set of split diamonds that follows a viewpoint.
 pub struct Follower<W> {
     splits: Splits,
     members: ByIndex<Member>,
-    watch: W,
+    tracker: W,
     next_number: u32,
     /// To look at: what may split, and what may merge.
     fresh: [Vec<u64>; 2],
-    tickets: Vec<Ticket>,
+    handles: Vec<TrackingHandle>,
     last: Option<Viewpoint>,
     visited: usize,
     found: Found,
 }
 
-impl<W: Watch> Follower<W> {
+impl<W: CrossingTracker> Follower<W> {
     /// Follows nothing yet.
     pub fn new(measured: &Measured) -> Self {
         Self {
             splits: Splits::none(measured),
             members: ByIndex::default(),
-            watch: W::default(),
+            tracker: W::default(),
             next_number: 0,
             fresh: [Vec::new(), Vec::new()],
-            tickets: Vec::new(),
+            handles: Vec::new(),
             last: None,
             visited: 0,
             found: Found::default(),
@@ -140,8 +140,8 @@ impl<W: Watch> Follower<W> {
     }
 
     /// Who looks after the front.
-    pub fn watch(&mut self) -> &mut W {
-        &mut self.watch
+    pub fn tracker(&mut self) -> &mut W {
+        &mut self.tracker
     }
 
     /// Diamonds looked at for the last viewpoint.
@@ -149,36 +149,36 @@ impl<W: Watch> Follower<W> {
         self.visited
     }
 
-    /// Moves on to a viewpoint; `false` if more than `most` diamonds would have split: then nothing is followed.
-    pub fn follow(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+    /// Moves on to a viewpoint; `false` if more than `max` diamonds would have split: then nothing is followed.
+    pub fn follow(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
         self.visited = 0;
         // Other spheres: all is to be looked at.
         let is_same = |last: &Viewpoint| Viewpoint { eye: from.eye, ..*last } == *from;
         if !self.last.as_ref().is_some_and(is_same) {
-            return self.start(measured, from, most);
+            return self.start(measured, from, max);
         }
         if self.last.is_some_and(|last| last.eye == from.eye) {
             return true;
         }
         self.last = Some(*from);
-        self.watch.due(from, &mut self.tickets, &mut self.visited);
+        self.tracker.due(from, &mut self.handles, &mut self.visited);
         // Where nearly all is to be looked at, the plain way is shorter.
-        if self.tickets.len() > 64 && self.tickets.len() > self.members.len() / 2 {
-            return self.start(measured, from, most);
+        if self.handles.len() > 64 && self.handles.len() > self.members.len() / 2 {
+            return self.start(measured, from, max);
         }
         self.redeem();
         // On the way there may be more than at the end, since what merges comes last.
-        self.settle(measured, from, most) || self.start(measured, from, most)
+        self.settle(measured, from, max) || self.start(measured, from, max)
     }
 
-    fn start(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+    fn start(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
         self.last = None;
-        self.tickets.clear();
+        self.handles.clear();
         self.members.clear();
-        self.watch.clear();
+        self.tracker.clear();
         self.fresh.iter_mut().for_each(Vec::clear);
         let mut found = std::mem::take(&mut self.found);
-        let fits = self.splits.refill(measured, from, &mut found, most);
+        let fits = self.splits.refill(measured, from, &mut found, max);
         self.visited += found.visited;
         if fits {
             self.last = Some(*from);
@@ -191,7 +191,7 @@ impl<W: Watch> Follower<W> {
             }
         }
         self.found = found;
-        fits && self.settle(measured, from, most)
+        fits && self.settle(measured, from, max)
     }
 
     fn add(&mut self, at: Place, index: usize, is_split: bool) {
@@ -210,22 +210,22 @@ impl<W: Watch> Follower<W> {
 
     fn remove(&mut self, index: usize) {
         if self.members.remove(&(index as u64)).is_some() {
-            self.watch.left(index as u64, &mut self.tickets);
+            self.tracker.left(index as u64, &mut self.handles);
         }
     }
 
     /// Looks again at those whose tickets are still good.
     fn redeem(&mut self) {
-        for ticket in self.tickets.drain(..) {
-            if let Some(member) = self.members.get_mut(&ticket.index).filter(|m| m.number == ticket.number) {
+        for handle in self.handles.drain(..) {
+            if let Some(member) = self.members.get_mut(&handle.index).filter(|m| m.number == handle.number) {
                 member.number = u32::MAX;
-                self.fresh[usize::from(member.is_split)].push(ticket.index);
+                self.fresh[usize::from(member.is_split)].push(handle.index);
             }
         }
     }
 
     /// Looks at members until none is on the wrong side of its sphere.
-    fn settle(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+    fn settle(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
         // What may merge comes last: it may be needed by then.
         while let Some(index) = self.fresh[0].pop().or_else(|| self.fresh[1].pop()) {
             let Some(&Member { at, is_split, number }) = self.members.get(&index) else { continue };
@@ -241,7 +241,7 @@ impl<W: Watch> Follower<W> {
                 (false, true) => self.merge(measured, from, at, index as usize),
             }
             self.redeem();
-            if self.splits.count() > most {
+            if self.splits.count() > max {
                 self.last = None;
                 return false;
             }
@@ -250,13 +250,13 @@ impl<W: Watch> Follower<W> {
     }
 
     fn look_after(&mut self, measured: &Measured, from: &Viewpoint, known: &Known, is_split: bool, slack: f64) {
-        let ticket = Ticket { index: known.index as u64, number: self.next_number };
+        let handle = TrackingHandle { index: known.index as u64, number: self.next_number };
         self.next_number = (self.next_number + 1) % u32::MAX;
-        self.members.get_mut(&ticket.index).expect("a member").number = ticket.number;
+        self.members.get_mut(&handle.index).expect("a member").number = handle.number;
         if slack.is_finite() {
             let Self { splits, members, visited, .. } = self;
             let mut front = Front { measured, from, splits, members, visited };
-            self.watch.place(&mut front, ticket, known, is_split, slack);
+            self.tracker.place(&mut front, handle, known, is_split, slack);
         }
     }
 

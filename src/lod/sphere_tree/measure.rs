@@ -63,8 +63,8 @@ impl Measured {
     /// what they hang on is there in full.
     pub fn new(field: Arc<Field>, band: f32, progress: &Progress) -> Self {
         let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
-        if let Some(land) = field.land() {
-            let evaluated = Some(Evaluated::new(Arc::clone(land), band > 1.0));
+        if let Some(terrain) = field.procedural() {
+            let evaluated = Some(Evaluated::new(Arc::clone(terrain), band > 1.0));
             let (errors, balls) = (Vec::new(), Vec::new());
             return Self { errors, balls, field, lattice, band, rounding: 0.0, evaluated };
         }
@@ -119,9 +119,9 @@ impl Measured {
             error += self.rounding;
         }
         for (at, child) in self.lattice.children(middle) {
-            let further = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
-            error = error.max(self.errors[child] * further);
-            ball = ball.max(self.centre(at).distance(centre) + f64::from(self.balls[child] * further));
+            let second_target = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
+            error = error.max(self.errors[child] * second_target);
+            ball = ball.max(self.centre(at).distance(centre) + f64::from(self.balls[child] * second_target));
         }
         (index, error, ((ball * (1.0 + SPARE)) as f32).next_up())
     }
@@ -187,8 +187,8 @@ impl Measured {
 
     /// The view with what rounding of vertices takes of its tolerance taken off; `None` if that is all of it.
     pub fn without_rounding(&self, view: &View) -> Option<View> {
-        let (Some(evaluated), Some(land)) = (&self.evaluated, self.field.land()) else { return Some(*view) };
-        let [low, high] = land.range_m();
+        let (Some(evaluated), Some(terrain)) = (&self.evaluated, self.field.procedural()) else { return Some(*view) };
+        let [low, high] = terrain.range_m();
         let px = view.tolerance.px - Reach::rounding_px(view, evaluated.rounding, high - low);
         (px > 0.0).then_some(View { tolerance: Tolerance { px, ..view.tolerance }, ..*view })
     }
@@ -239,9 +239,12 @@ mod tests {
                 let out = |at| measured.lattice.sticks_out(at);
                 for (at, index) in measured.lattice.children(parent.at) {
                     let child = measured.known(at, index);
-                    let further = if !out(parent.at) && out(at) { band } else { 1.0 };
-                    let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(further);
-                    assert!(reach <= f64::from(parent.ball) && child.error * further <= parent.error, "{parent:?}");
+                    let second_target = if !out(parent.at) && out(at) { band } else { 1.0 };
+                    let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(second_target);
+                    assert!(
+                        reach <= f64::from(parent.ball) && child.error * second_target <= parent.error,
+                        "{parent:?}"
+                    );
                     assert!(measured.lattice.parents(at).any(|(_, index)| index == parent.index), "{child:?}");
                     children += 1;
                 }

@@ -5,7 +5,7 @@
 //! wedges that share a hypotenuse split together, so one sphere serves both, about the middle of that hypotenuse
 //! ([`lattice`]). What has split is thus a function of the eye's place alone. Which spheres it may have crossed is found
 //! in four ways, with the same triangles: made-up spheres about the viewpoint that group those it cannot have crossed
-//! ([`shells`]); the same for those that lie behind no other one, as the lecture has it, which costs more than it saves
+//! ([`bounding_spheres`]); the same for those that lie behind no other one, as the lecture has it, which costs more than it saves
 //! ([`covers`]); ROAM's two queues ([`roam`]); and every sphere anew ([`splits`]).
 //!
 //! Where this differs from the lecture, and why:
@@ -21,6 +21,7 @@
 //! Laws kept: watertight, covered once, error within tolerance, no state between views (`hold=off`).
 
 pub mod blocks;
+pub mod bounding_spheres;
 pub mod covers;
 pub mod evaluated;
 pub mod front;
@@ -31,12 +32,12 @@ pub mod open;
 pub mod patches;
 pub mod reach;
 pub mod roam;
-pub mod shells;
 pub mod splits;
 
 use std::sync::Arc;
 
 use self::blocks::Blocks;
+use self::bounding_spheres::BoundingSpheres;
 use self::covers::Covers;
 use self::front::Follower;
 use self::measure::Measured;
@@ -44,10 +45,9 @@ use self::mesh::Mesh;
 use self::patches::Patches;
 use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
-use self::shells::Shells;
 use self::splits::{Changes, Found, Splits};
-use super::{Entry, Setting, Settings, Technique, Values, widened};
-use crate::draw::{DrawList, Draws, Geometry, Limits, Manner, Normals};
+use super::{Entry, Setting, Settings, Technique, Values, select_within_limits};
+use crate::draw::{DrawKinds, DrawList, Geometry, Limits, Normals, PipelineRequirements};
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
@@ -56,9 +56,9 @@ const BAND: f32 = 1.3;
 /// Diamonds that have split stay so up to this many times a sphere's radius, if they are held.
 const HOLD: f64 = 1.1;
 /// The most diamonds that split, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
-const MOST_SPLITS: usize = 1 << 20;
+const MAX_SPLITS: usize = 1 << 20;
 /// The same of a land without end, whose diamonds are worked out as they are met.
-const MOST_OPEN_SPLITS: usize = 1 << 17;
+const MAX_OPEN_SPLITS: usize = 1 << 17;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
@@ -93,7 +93,7 @@ pub const ENTRY: Entry = Entry {
         },
     ],
     needs: &[],
-    most_samples: 1 << 27,
+    max_samples: 1 << 27,
     max_side: MAX_SIDE,
     takes_endless: true,
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
@@ -101,7 +101,7 @@ pub const ENTRY: Entry = Entry {
 
 /// How the split diamonds are found.
 enum Criterion {
-    Spheres(Follower<Shells>),
+    Spheres(Follower<BoundingSpheres>),
     Covers(Follower<Covers>),
     Roam(Follower<Queues>),
     Plain { splits: Splits, found: Found },
@@ -122,12 +122,12 @@ struct SphereTree {
 }
 
 impl Criterion {
-    fn follow(&mut self, measured: &Measured, from: &Viewpoint, most: usize) -> bool {
+    fn follow(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
         match self {
-            Criterion::Spheres(follower) => follower.follow(measured, from, most),
-            Criterion::Covers(follower) => follower.follow(measured, from, most),
-            Criterion::Roam(follower) => follower.follow(measured, from, most),
-            Criterion::Plain { splits, found } => splits.refill(measured, from, found, most),
+            Criterion::Spheres(follower) => follower.follow(measured, from, max),
+            Criterion::Covers(follower) => follower.follow(measured, from, max),
+            Criterion::Roam(follower) => follower.follow(measured, from, max),
+            Criterion::Plain { splits, found } => splits.refill(measured, from, found, max),
         }
     }
 
@@ -184,15 +184,15 @@ impl SphereTree {
 /// three each.
 fn limits(measured: &Measured, blocks: &Blocks) -> Limits {
     let [w, h] = measured.field.size().map(|n| n as usize);
-    let triangles = (2 * (w - 1) * (h - 1)).min(2 * most_splits(measured) + 2);
+    let triangles = (2 * (w - 1) * (h - 1)).min(2 * max_splits(measured) + 2);
     let draws = blocks.number() + 1;
     let vertices = triangles + 8 * draws;
     let normals = if measured.is_endless() { vertices } else { 0 };
     Limits { draws, instances: draws, vertices, normals, indices: 3 * triangles, upload_bytes: 0 }
 }
 
-fn most_splits(measured: &Measured) -> usize {
-    if measured.is_endless() { MOST_OPEN_SPLITS } else { MOST_SPLITS }
+fn max_splits(measured: &Measured) -> usize {
+    if measured.is_endless() { MAX_OPEN_SPLITS } else { MAX_SPLITS }
 }
 
 impl Technique for SphereTree {
@@ -205,12 +205,12 @@ impl Technique for SphereTree {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        let (from, widening) = widened(view, |wider| {
+        let (from, tolerance_scale) = select_within_limits(view, |wider| {
             let (eye, reach) = (self.measured.relative(view.eye), Reach::new(&self.measured.without_rounding(wider)?));
             let from = Viewpoint { eye, reach, band: self.band, hold: self.hold };
-            self.criterion.follow(&self.measured, &from, most_splits(&self.measured)).then_some(from)
+            self.criterion.follow(&self.measured, &from, max_splits(&self.measured)).then_some(from)
         });
-        list.widening = widening;
+        list.tolerance_scale = tolerance_scale;
         self.blocks.look(view);
         let changes = self.criterion.changes();
         let Self { measured, blocks, criterion, patches, .. } = self;
@@ -218,8 +218,8 @@ impl Technique for SphereTree {
             patches.begin(&changes, from.band > 1.0, blocks);
         }
         let mesh = Mesh { measured, splits: criterion.splits(), blocks, from: &from };
-        match measured.field.land() {
-            Some(land) => mesh.fill_open(land, view, list),
+        match measured.field.procedural() {
+            Some(terrain) => mesh.fill_open(terrain, view, list),
             None => mesh.fill(patches.as_mut(), list),
         }
         let size = list.size();
@@ -234,12 +234,12 @@ impl Technique for SphereTree {
         true
     }
 
-    fn manner(&self) -> Manner {
+    fn pipeline_requirements(&self) -> PipelineRequirements {
         let normals = if self.measured.is_endless() { Normals::Vertices } else { Normals::Texture };
-        Manner { draws: Draws::EXPLICIT, normals, ..Manner::default() }
+        PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
-    fn figures(&self) -> Vec<(&'static str, f64, &'static str)> {
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("wedges visited for the last view", 2.0 * self.criterion.visited() as f64, ""),
             ("wedges split in the last view", 2.0 * self.criterion.splits().count() as f64, ""),

@@ -20,9 +20,9 @@ const SMOOTHED_PX: f64 = 6.0;
 
 impl Mesh<'_> {
     /// Fills an empty list: one draw.
-    pub fn fill_open(&self, land: &Bezier, view: &View, list: &mut DrawList) {
+    pub fn fill_open(&self, terrain: &Bezier, view: &View, list: &mut DrawList) {
         // The height of the land nearest the eye's: no vertex is further from it than from the eye.
-        let [low, high] = land.range_m();
+        let [low, high] = terrain.range_m();
         list.height_base = view.eye.y.clamp(low, high) as f32;
         let (mut piece, mut numbers) = (Piece::default(), HashMap::new());
         for wedge in self.roots() {
@@ -38,7 +38,7 @@ impl Mesh<'_> {
         }
         let height_base = f64::from(list.height_base);
         let normal =
-            |vertex: &ExplicitVertex| normal(land, view, vertex.position, height_base + f64::from(vertex.height));
+            |vertex: &ExplicitVertex| normal(terrain, view, vertex.position, height_base + f64::from(vertex.height));
         list.streamed.normals = piece.vertices.par_iter().with_min_len(64).map(normal).collect();
         push(list, piece);
     }
@@ -65,13 +65,13 @@ impl Mesh<'_> {
     }
 }
 
-fn normal(land: &Bezier, view: &View, at: Place, height: f64) -> VertexNormals {
+fn normal(terrain: &Bezier, view: &View, at: Place, height: f64) -> VertexNormals {
     let [x, z] = at.map(|n| f64::from(n) * SPACING_M);
     let distance = match view.lens {
         Lens::Perspective { .. } => view.eye.distance(DVec3::new(x, height, z)),
         Lens::Orthographic { .. } => 1.0,
     };
-    let [along_x, along_z] = land.slopes([x, z], SMOOTHED_PX * distance / view.focal_px());
+    let [along_x, along_z] = terrain.slopes([x, z], SMOOTHED_PX * distance / view.focal_px());
     let normal = pack(DVec3::new(-along_x, 1.0, -along_z).normalize_or(DVec3::Y).as_vec3());
-    VertexNormals { normal, target: normal, further: normal }
+    VertexNormals { normal, target: normal, second_target: normal }
 }

@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::front::{Front, Ticket, Watch};
+use super::front::{CrossingTracker, Front, TrackingHandle};
 use super::measure::Known;
 use super::reach::Viewpoint;
 
@@ -19,7 +19,7 @@ use super::reach::Viewpoint;
 pub struct Queues {
     /// Way of the viewpoint, metres, upon which members are due, as the bits of a positive float: of those that may
     /// split, and of those that may merge.
-    queues: [BinaryHeap<Reverse<(u64, Ticket)>>; 2],
+    queues: [BinaryHeap<Reverse<(u64, TrackingHandle)>>; 2],
     /// Way of the viewpoint so far, metres.
     way: f64,
     eye: Option<DVec3>,
@@ -27,26 +27,26 @@ pub struct Queues {
     pub largest_speed: f64,
 }
 
-impl Watch for Queues {
+impl CrossingTracker for Queues {
     fn clear(&mut self) {
         self.queues.iter_mut().for_each(BinaryHeap::clear);
         (self.way, self.eye) = (0.0, None);
     }
 
-    fn due(&mut self, from: &Viewpoint, tickets: &mut Vec<Ticket>, _visited: &mut usize) {
+    fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, _visited: &mut usize) {
         if let Some(eye) = self.eye {
             self.way += eye.distance(from.eye).max(self.largest_speed) * (1.0 + 1e-9);
         }
         self.eye = Some(from.eye);
         for queue in &mut self.queues {
             while queue.peek().is_some_and(|Reverse((way, _))| f64::from_bits(*way) <= self.way) {
-                tickets.extend(queue.pop().map(|Reverse((_, ticket))| ticket));
+                handles.extend(queue.pop().map(|Reverse((_, handle))| handle));
             }
         }
     }
 
-    fn place(&mut self, front: &mut Front, ticket: Ticket, _known: &Known, is_split: bool, slack: f64) {
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, _known: &Known, is_split: bool, slack: f64) {
         self.eye = Some(front.from.eye);
-        self.queues[usize::from(is_split)].push(Reverse(((self.way + slack).to_bits(), ticket)));
+        self.queues[usize::from(is_split)].push(Reverse(((self.way + slack).to_bits(), handle)));
     }
 }

@@ -149,8 +149,8 @@ impl Splits {
     }
 
     /// Looks at every diamond that could have split, from the root on, and makes this the set for the viewpoint.
-    /// It gives up, and says so, beyond `most` diamonds.
-    pub fn refill(&mut self, measured: &Measured, from: &Viewpoint, found: &mut Found, most: usize) -> bool {
+    /// It gives up, and says so, beyond `max` diamonds.
+    pub fn refill(&mut self, measured: &Measured, from: &Viewpoint, found: &mut Found, max: usize) -> bool {
         std::mem::swap(self, &mut found.before);
         self.clear(measured);
         found.split.clear();
@@ -168,7 +168,7 @@ impl Splits {
                 if (slack > 0.0) != was_split {
                     continue;
                 }
-                if self.count == most {
+                if self.count == max {
                     return false;
                 }
                 self.insert(at, index);

@@ -42,30 +42,30 @@ impl<'a> Rtin<'a> {
         let side = cells[0].max(cells[1]).next_power_of_two() as i32;
         let words = (side as usize + 1).pow(2).div_ceil(64);
         let mut mesh = Rtin { field, side, last: cells.map(|n| n as i32), tolerance_m, split: vec![0; words] };
-        let mut waiting = Vec::new();
-        roots(side).into_iter().for_each(|triangle| mesh.demand(triangle, &mut waiting));
-        while let Some(at) = waiting.pop() {
+        let mut pending = Vec::new();
+        roots(side).into_iter().for_each(|triangle| mesh.demand(triangle, &mut pending));
+        while let Some(at) = pending.pop() {
             if mesh.mark(at) {
-                mesh.follow(at, &mut waiting);
+                mesh.follow(at, &mut pending);
             }
         }
         mesh
     }
 
     /// Asks for the splits that one at a position needs, before it and after it.
-    fn follow(&self, at: [i32; 2], waiting: &mut Vec<[i32; 2]>) {
+    fn follow(&self, at: [i32; 2], pending: &mut Vec<[i32; 2]>) {
         let (before, after) = around(at, self.side);
-        waiting.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
-        (0..4).for_each(|k| self.demand([at, after[k], after[(k + 1) % 4]], waiting));
+        pending.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
+        (0..4).for_each(|k| self.demand([at, after[k], after[(k + 1) % 4]], pending));
     }
 
     /// Asks for the split of a triangle [apex, base, base] if it is beyond the error.
-    fn demand(&self, triangle: [[i32; 2]; 3], waiting: &mut Vec<[i32; 2]>) {
+    fn demand(&self, triangle: [[i32; 2]; 3], pending: &mut Vec<[i32; 2]>) {
         if triangle.iter().all(|&p| self.is_inside(p))
             && let Some(at) = midpoint(triangle)
             && self.error(triangle) > self.tolerance_m
         {
-            waiting.push(at);
+            pending.push(at);
         }
     }
 

@@ -26,11 +26,11 @@ fn a_plane_takes_two_triangles() {
 #[test]
 fn the_true_error_is_kept_and_more_error_takes_fewer_triangles() {
     for size in [[65, 65], [70, 41], [3, 130]] {
-        let land = field(size, rough);
+        let terrain = field(size, rough);
         for mesh in [greedy, rtin] {
             let counts: Vec<u64> = [0.01, 0.1, 1.0, 4.0, 30.0]
                 .map(|tolerance_m| {
-                    let mesh = mesh(&land, tolerance_m).unwrap();
+                    let mesh = mesh(&terrain, tolerance_m).unwrap();
                     assert!(mesh.max_error_m <= tolerance_m, "{mesh:?} for {tolerance_m} m");
                     mesh.triangles
                 })
@@ -50,12 +50,12 @@ fn no_mesh_of_right_triangles_is_coarser() {
     // Noise, and single spikes: these need splits that no error asks for.
     let noise = |seed: u32| field([5, 5], |i, j| ((i * 31 + j * 17 + seed * 7 + 3).pow(3) >> 4 & 15) as f32);
     let spike = |at: [u32; 2]| field([5, 5], |i, j| if [i, j] == at { 12.0 } else { 0.0 });
-    let lands = [noise(0), noise(1), spike([1, 0]), spike([3, 2]), spike([3, 3]), spike([0, 3])];
-    for (k, land) in lands.into_iter().enumerate() {
+    let terrains = [noise(0), noise(1), spike([1, 0]), spike([3, 2]), spike([3, 3]), spike([0, 3])];
+    for (k, terrain) in terrains.into_iter().enumerate() {
         for tolerance_m in [4.0, 7.0] {
             let meshes = (0..1u32 << inner.len()).into_par_iter().map(subset);
-            let smallest = meshes.filter_map(|splits: u32| conforming_within(&land, splits, tolerance_m)).min();
-            let found = rtin(&land, tolerance_m).unwrap().triangles;
+            let smallest = meshes.filter_map(|splits: u32| conforming_within(&terrain, splits, tolerance_m)).min();
+            let found = rtin(&terrain, tolerance_m).unwrap().triangles;
             assert_eq!(Some(found), smallest, "land {k}, {tolerance_m} m");
             between += usize::from(found > 2 && found < 32);
         }
@@ -65,7 +65,7 @@ fn no_mesh_of_right_triangles_is_coarser() {
 
 /// Triangles of the mesh that is split at the positions x + 5·z of a set; `None` if it is beyond the error, if a
 /// position is not reached, or if one is reached from one side only.
-fn conforming_within(land: &Field, splits: u32, tolerance_m: f64) -> Option<u64> {
+fn conforming_within(terrain: &Field, splits: u32, tolerance_m: f64) -> Option<u64> {
     let mut open = vec![[[0, 4], [4, 4], [0, 0]], [[4, 0], [0, 0], [4, 4]]];
     let (mut whole, mut reached) = (Vec::new(), [0; 25]);
     while let Some([apex, a, b]) = open.pop() {
@@ -89,8 +89,8 @@ fn conforming_within(land: &Field, splits: u32, tolerance_m: f64) -> Option<u64>
             2
         }
     };
-    let corner = |[x, z]: [i32; 2]| Corner { x, z, y: land.height(x as u32, z as u32) };
-    let error = |t: &[[i32; 2]; 3]| f64::from(surface::deviation(land, &facing_up(&t.map(corner))));
+    let corner = |[x, z]: [i32; 2]| Corner { x, z, y: terrain.height(x as u32, z as u32) };
+    let error = |t: &[[i32; 2]; 3]| f64::from(surface::deviation(terrain, &facing_up(&t.map(corner))));
     let fits = (0..25).all(|k| reached[k] == expected(k)) && whole.iter().all(|t| error(t) <= tolerance_m);
     fits.then_some(whole.len() as u64)
 }
@@ -99,10 +99,10 @@ fn conforming_within(land: &Field, splits: u32, tolerance_m: f64) -> Option<u64>
 /// relief, by true largest error.
 #[test]
 fn the_published_counts_of_the_peers_field() {
-    let land = synth::synth(Kind::Peers, [1025, 1025], 1);
+    let terrain = synth::synth(Kind::Peers, [1025, 1025], 1);
     for (tolerance_m, published) in [(4.0, 1260.0), (2.0, 3400.0), (1.0, 9900.0)] {
-        let greedy = greedy(&land, tolerance_m).unwrap();
-        let rtin = rtin(&land, tolerance_m).unwrap();
+        let greedy = greedy(&terrain, tolerance_m).unwrap();
+        let rtin = rtin(&terrain, tolerance_m).unwrap();
         println!("{tolerance_m} m: greedy {greedy:?}, rtin {rtin:?}");
         let ratio = greedy.triangles as f64 / published;
         assert!((0.96..1.04).contains(&ratio), "{tolerance_m} m: {ratio} times the published count");
@@ -113,14 +113,14 @@ fn the_published_counts_of_the_peers_field() {
 
 #[test]
 fn tiles_cost_a_few_per_cent() {
-    let land = synth::synth(Kind::Peers, [1025 + 512, 1025], 1);
+    let terrain = synth::synth(Kind::Peers, [1025 + 512, 1025], 1);
     assert_eq!(
         (seams(1024), seams(1025), seams(4096)),
         (vec![0, 1024], vec![0, 512, 1025], vec![0, 1024, 2048, 3072, 4096])
     );
-    let tiled = greedy(&land, 2.0).unwrap();
+    let tiled = greedy(&terrain, 2.0).unwrap();
     assert_eq!(tiled.tiles, [2, 1]);
-    let whole = Tile { field: &land, first: [0, 0], last: [1536, 1024] }.greedy(2.0).unwrap();
+    let whole = Tile { field: &terrain, first: [0, 0], last: [1536, 1024] }.greedy(2.0).unwrap();
     let ratio = tiled.triangles as f64 / whole.0 as f64;
     println!("{} triangles in tiles, {} as one: {ratio}", tiled.triangles, whole.0);
     assert!((0.99..1.06).contains(&ratio) && tiled.max_error_m <= 2.0, "{ratio}");
@@ -140,10 +140,10 @@ fn holes_are_meshed_as_filled() {
 
 #[test]
 fn errors_that_cannot_be_are_refused() {
-    let land = field([9, 9], rough);
+    let terrain = field([9, 9], rough);
     for tolerance_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         for mesh in [greedy, rtin] {
-            let text = mesh(&land, tolerance_m).unwrap_err().to_string();
+            let text = mesh(&terrain, tolerance_m).unwrap_err().to_string();
             assert!(text.contains("vertical error: expected more than 0 m") && !text.contains('\n'), "{text}");
         }
     }
@@ -152,11 +152,11 @@ fn errors_that_cannot_be_are_refused() {
 /// A mesh that does not cover its tile is found.
 #[test]
 fn a_broken_mesh_has_no_error() {
-    let land = field([3, 3], |_, _| 0.0);
+    let terrain = field([3, 3], |_, _| 0.0);
     let corner = |x, z| Corner { x, z, y: 0.0 };
     let half = [corner(0, 0), corner(0, 2), corner(2, 2)];
     let other = [corner(0, 0), corner(2, 2), corner(2, 0)];
-    assert_eq!(true_error(&land, &[half, other]), Some(0.0));
-    assert_eq!(true_error(&land, &[half]), None);
-    assert_eq!(true_error(&land, &[half, [other[0], other[2], other[1]]]), None);
+    assert_eq!(true_error(&terrain, &[half, other]), Some(0.0));
+    assert_eq!(true_error(&terrain, &[half]), None);
+    assert_eq!(true_error(&terrain, &[half, [other[0], other[2], other[1]]]), None);
 }

@@ -12,7 +12,7 @@ const SIZE: u32 = 512;
 const MARGIN: f64 = 1.5;
 
 const GROUND: Rgb<u8> = Rgb([255, 255, 255]);
-const LAND: Rgb<u8> = Rgb([214, 224, 206]);
+const TERRAIN: Rgb<u8> = Rgb([214, 224, 206]);
 const EDGE: Rgb<u8> = Rgb([110, 125, 100]);
 /// A triangle at fault, and where two of them lie on each other.
 const FAULT: Rgb<u8> = Rgb([240, 140, 120]);
@@ -29,7 +29,7 @@ pub fn picture(triangles: &[Drawn], found: &CounterExample) -> RgbImage {
     let window = Window::around(&found.triangles);
     let mut picture = RgbImage::from_pixel(SIZE, SIZE, GROUND);
     let near: Vec<&Triangle> = triangles.iter().map(|t| &t.corners).filter(|t| window.meets(t)).collect();
-    near.iter().for_each(|t| window.fill(&mut picture, t, |_| LAND));
+    near.iter().for_each(|t| window.fill(&mut picture, t, |_| TERRAIN));
     let fault = |under| match (found.kind, under) {
         (Kind::Gap, _) => MISSING,
         (_, FAULT | FAULT_TWICE) => FAULT_TWICE,
@@ -144,12 +144,12 @@ mod tests {
         let (west, east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
         let drawn = [west, east].map(|corners| Drawn { corners, instance: 0 });
         let shown = picture(&drawn, &example(Kind::Overlap, vec![west]));
-        assert_eq!((at(&shown, 2.0, 5.0), at(&shown, 5.0, 2.0), at(&shown, -2.0, 5.0)), (FAULT, LAND, GROUND));
+        assert_eq!((at(&shown, 2.0, 5.0), at(&shown, 5.0, 2.0), at(&shown, -2.0, 5.0)), (FAULT, TERRAIN, GROUND));
         assert_eq!((at(&shown, 4.0, 4.0), at(&shown, 8.0, 4.0)), (FAULT_EDGE, EDGE));
         let twice = picture(&drawn, &example(Kind::Overlap, vec![west, west]));
-        assert_eq!((at(&twice, 2.0, 5.0), at(&twice, 5.0, 2.0)), (FAULT_TWICE, LAND));
+        assert_eq!((at(&twice, 2.0, 5.0), at(&twice, 5.0, 2.0)), (FAULT_TWICE, TERRAIN));
         let gap = picture(&drawn[1..], &example(Kind::Gap, vec![west]));
-        assert_eq!((at(&gap, 2.0, 5.0), at(&gap, 5.0, 2.0)), (MISSING, LAND));
+        assert_eq!((at(&gap, 2.0, 5.0), at(&gap, 5.0, 2.0)), (MISSING, TERRAIN));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::edges::BorderEdge;
 use super::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
-use crate::height::surface::{Corner, is_land};
+use crate::height::surface::{Corner, is_terrain};
 use crate::height::{Field, rtin};
 use crate::view::{Aabb, Containment, Frustum};
 
@@ -129,7 +129,7 @@ pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), 
         let first = strips.partition_point(|s| s.band < band);
         let strips = &strips[first..first + strips[first..].partition_point(|s| s.band == band)];
         let shows = |t: &[[i32; 2]; 3]| {
-            is_land(field, t) && !strips.iter().any(|s| s.contains(t)) && may_be_seen(field, frustum, *t)
+            is_terrain(field, t) && !strips.iter().any(|s| s.contains(t)) && may_be_seen(field, frustum, *t)
         };
         open_runs(field, strips).find_map(|run| {
             let samples = (run.start..=run.end).flat_map(|x| [[x, band], [x, band + 1]]);
@@ -138,7 +138,7 @@ pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), 
         })
     });
     let Some(triangle) = missing else { return Ok(()) };
-    let text = format!("land at {triangle:?} is neither covered nor out of sight");
+    let text = format!("terrain at {triangle:?} is neither covered nor out of sight");
     let corners = triangle.map(|[x, z]| Corner { x, z, y: field.height(x as u32, z as u32) });
     Err(Box::new(CounterExample { kind: Kind::Gap, triangles: vec![corners], text }))
 }

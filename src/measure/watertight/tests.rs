@@ -103,7 +103,7 @@ fn a_halved_neighbour_is_a_t_junction() {
 }
 
 #[test]
-fn missing_land_is_a_gap_if_it_may_be_seen_and_has_data() {
+fn missing_terrain_is_a_gap_if_it_may_be_seen_and_has_data() {
     let whole = field(&[]);
     let mut triangles = samples_surface(&whole);
     // Cell (4, 3): both its triangles.

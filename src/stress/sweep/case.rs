@@ -12,7 +12,7 @@ use super::terrain::Terrain;
 use super::viewpoint::Viewpoint;
 use crate::height::Field;
 use crate::lod::{self, Entry, Settings};
-use crate::stress::laws::{Broken, LAWS, Subject};
+use crate::stress::invariants::{INVARIANTS, Subject, Violation};
 use crate::stress::panic_text;
 use crate::view::{Metric, Tolerance, View};
 
@@ -56,7 +56,7 @@ impl SweepCase {
     pub fn check(&self) -> Result<(), Box<Failure>> {
         match self.entry() {
             Ok(entry) => self.check_with(entry),
-            Err(why) => Err(self.fails("it can be prepared", Broken::new(("the case's view", self.scene().1), why))),
+            Err(why) => Err(self.fails("it can be prepared", Violation::new(("the case's view", self.scene().1), why))),
         }
     }
 
@@ -64,30 +64,31 @@ impl SweepCase {
     pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];
-        match catch_unwind(AssertUnwindSafe(|| self.keeps_laws(entry, &field, &views))) {
-            Ok(outcome) => outcome.map_err(|(law, broken)| self.fails(law, broken)),
-            Err(panic) => Err(self.fails("no panic", Broken::new(views[0], panic_text(&*panic)))),
+        match catch_unwind(AssertUnwindSafe(|| self.keeps_invariants(entry, &field, &views))) {
+            Ok(outcome) => outcome.map_err(|(invariant, violation)| self.fails(invariant, violation)),
+            Err(panic) => Err(self.fails("no panic", Violation::new(views[0], panic_text(&*panic)))),
         }
     }
 
-    fn fails(&self, law: &'static str, broken: Broken) -> Box<Failure> {
-        Box::new(Failure { case: self.clone(), law, broken })
+    fn fails(&self, invariant: &'static str, violation: Violation) -> Box<Failure> {
+        Box::new(Failure { case: self.clone(), invariant, violation })
     }
 
-    fn keeps_laws(
+    fn keeps_invariants(
         &self,
         entry: &Entry,
         field: &Arc<Field>,
         views: &[(&'static str, View)],
-    ) -> Result<(), (&'static str, Broken)> {
+    ) -> Result<(), (&'static str, Violation)> {
         let settings = Settings::new(entry, self.variant.as_deref(), &self.settings);
         let prepared = settings.and_then(|settings| entry.prepare(field, &settings));
-        let mut technique = prepared.map_err(|why| ("it can be prepared", Broken::new(views[0], why)))?;
+        let mut technique = prepared.map_err(|why| ("it can be prepared", Violation::new(views[0], why)))?;
         let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
         let mut subject =
             Subject { field, technique: &mut *technique, views, tolerances_px: &tolerances_px, time_s: 0.0 };
-        let mut laws = LAWS.iter().filter(|law| law.is_for(&self.technique));
-        laws.try_for_each(|law| (law.check)(&mut subject).map_err(|broken| (law.name, broken)))
+        let mut invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(&self.technique));
+        invariants
+            .try_for_each(|invariant| (invariant.check)(&mut subject).map_err(|violation| (invariant.name, violation)))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The random sweep: every technique on random terrain, in random settings and views, held against every invariant.
 //!
-//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`LAWS`](super::laws::LAWS) ([`case`]). One that
+//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`INVARIANTS`](super::laws::LAWS) ([`case`]). One that
 //! fails is made smaller as long as it fails in the same way ([`shrink`]), and is printed as one line of JSON that runs
 //! again anywhere.
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 pub use self::case::SweepCase;
 use super::forms::Form;
-use super::laws::Broken;
+use super::invariants::Violation;
 use super::{Case, Finding, Kind};
 
 /// The family `sweep`.
@@ -33,14 +33,14 @@ pub struct Failure {
     /// The case.
     pub case: SweepCase,
     /// The invariant.
-    pub law: &'static str,
+    pub invariant: &'static str,
     /// The view and the reason.
-    pub broken: Broken,
+    pub violation: Violation,
 }
 
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.law, self.broken.why, self.case)
+        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
     }
 }
 
@@ -59,6 +59,7 @@ fn of_form(form: &Form) -> Vec<Finding> {
     let first = failures.first();
     let count = Finding::within("cases that fail", failures.len() as f64, 0.0);
     vec![
-        Finding { broken: first.map(|failure| failure.broken.clone()), ..count }.because(first.map(Failure::to_string)),
+        Finding { violation: first.map(|failure| failure.violation.clone()), ..count }
+            .because(first.map(Failure::to_string)),
     ]
 }

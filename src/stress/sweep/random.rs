@@ -72,7 +72,7 @@ fn value(random: &mut Rng, setting: &Setting) -> Option<(String, String)> {
 
 fn terrain(random: &mut Rng) -> Terrain {
     let kinds: Vec<_> = KINDS.iter().filter(|kind| !kind.name.starts_with("cave")).collect();
-    let most = match random.u32(0..100) {
+    let max = match random.u32(0..100) {
         0..70 => MAX_SAMPLES[0],
         70..92 => MAX_SAMPLES[1],
         92..99 => MAX_SAMPLES[2],
@@ -98,7 +98,7 @@ fn terrain(random: &mut Rng) -> Terrain {
     }
     loop {
         terrain.size = [0, 1].map(|_| side(random));
-        if terrain.samples() <= most {
+        if terrain.samples() <= max {
             return terrain;
         }
     }

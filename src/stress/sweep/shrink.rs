@@ -12,7 +12,7 @@ const MAX_TRIES: usize = 400;
 pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Box<Failure>>) -> Failure {
     let mut tries = 0;
     loop {
-        let fails = |case: SweepCase| check(&case).err().filter(|other| other.law == failure.law);
+        let fails = |case: SweepCase| check(&case).err().filter(|other| other.invariant == failure.invariant);
         let smaller = candidates(&failure.case).into_iter().take(MAX_TRIES - tries).find_map(|case| {
             tries += 1;
             fails(case)

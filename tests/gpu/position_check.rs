@@ -1,0 +1,148 @@
+//! `position.glsl` and its CPU twin agree to the bit.
+
+use std::sync::Arc;
+
+use cuesta::draw::layout::{ExplicitVertex, Frame, VertexNormals};
+use cuesta::draw::normals::explicit_normal;
+use cuesta::draw::place::{explicit_height, explicit_position, placed, relative_position};
+use cuesta::draw::skirts::{self, is_skirted};
+use cuesta::draw::{DrawList, Instance, Morph, PipelineRequirements, Seams};
+use cuesta::gpu::Gpu;
+use cuesta::gpu::position_check::{self, Query};
+use cuesta::height::{Field, synth};
+use cuesta::plan::{Look, ScenePlan};
+use cuesta::view::View;
+
+use super::{as_f32, aslant, mountains, on_device, technique};
+
+/// Every vertex of every third instance that a technique draws, with its weights or made-up ones.
+fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
+    let mut technique = technique(field, name, settings);
+    let mut list = DrawList::default();
+    technique.select(view, &mut list);
+    let lattice = &technique.resident().lattice;
+    let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
+        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
+        let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
+        let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
+        let mut weights =
+            [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
+        if is_skirted(instance) {
+            skirts::set(&mut weights, random(1), 1.0 + f32::from(k) / 7.0);
+        }
+        let morphing = Instance { weights, ..*instance };
+        lattice.iter().map(move |v| Query {
+            vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
+            normals: VertexNormals::default(),
+            instance: if is_made_up { morphing } else { *instance },
+            explicit_height: 0,
+        })
+    });
+    queries.collect()
+}
+
+/// Lattice vertices of two techniques, and explicit vertices with weights of their own.
+fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
+    let forms: &[(&str, &[&str])] = match morph {
+        // Without weights the program does not know of half samples.
+        Morph::No => &[("geomipmap", &["block=17"])],
+        Morph::ByInstance => &[
+            ("geomipmap", &["block=17"]),
+            ("clusters", &["block=8", "morph=on"]),
+            ("clusters", &["block=8", "morph=on", "seams=skirts"]),
+        ],
+        Morph::ByDistance => {
+            &[("clusters", &["block=8", "morph=distance"]), ("clusters:draw-per-block", &["block=8", "morph=distance"])]
+        }
+    };
+    let is_made_up = morph == Morph::ByInstance;
+    let of_form = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, is_made_up);
+    let mut queries: Vec<_> = forms.iter().flat_map(of_form).collect();
+    let explicit = (0..2000u32).map(|k| Query {
+        vertex: ExplicitVertex {
+            position: [(k % 37) as i32, (k / 37) as i32],
+            height: 1234.567 + 0.37 * k as f32,
+            target: 1200.0 + 1.7 * k as f32,
+            second_target: 1400.0 - 0.9 * k as f32,
+            morph: k as f32 / 1999.0,
+            // Of neither, of the vertex, of both.
+            regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
+        },
+        // Steep and level ones too; y is what x and z leave.
+        normals: VertexNormals {
+            normal: k.wrapping_mul(0x9e37_79b1),
+            target: k.wrapping_mul(0x85eb_ca6b),
+            second_target: if k % 5 == 0 { 0 } else { k.wrapping_mul(0xc2b2_ae35) },
+        },
+        instance: Instance {
+            origin: [5, 3],
+            cells: 64,
+            shift: (k % 2) as i32,
+            rotation: k % 4,
+            weights: [k, k + 1, k + 2, k + 3].map(|n| n.wrapping_mul(0x9e37_79b1) & 0x7f7f_7f7f),
+            ..Instance::default()
+        },
+        explicit_height: 1,
+    });
+    queries.extend(explicit);
+    queries
+}
+
+fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
+    let vertex = &query.vertex;
+    if query.explicit_height == 0 {
+        let placed = placed(field, frame, &query.instance, vertex.position);
+        return relative_position(frame, placed.at.map(|n| n << frame.fraction_bits), placed.height);
+    }
+    let height = explicit_height(&query.instance, vertex);
+    relative_position(frame, explicit_position(frame, &query.instance, vertex), height)
+}
+
+fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
+    for (morph, fraction_bits) in [(Morph::No, 0), (Morph::No, 6), (Morph::ByInstance, 0), (Morph::ByDistance, 0)] {
+        compare_morph(gpu, name, field, page_shift, morph, fraction_bits);
+    }
+}
+
+fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph, fraction_bits: i32) {
+    let view = aslant(field, [320, 200], 2.0);
+    let frame = Frame { fraction_bits, ..Frame::placing(field, &view) };
+    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
+        .unwrap()
+        .with_requirements(PipelineRequirements { morph, seams: Seams::Skirts, ..PipelineRequirements::default() });
+    plan.page_shift = page_shift;
+    let queries = queries(field, &view, morph);
+    let device = position_check::answers(gpu, &plan, field, &frame, &queries).unwrap();
+    for (query, there) in queries.iter().zip(device) {
+        let here = on_the_cpu(field, &frame, query);
+        assert_eq!(
+            here.map(f32::to_bits),
+            there.position.map(f32::to_bits),
+            "{name}: {here:?} {there:?} {query:?}",
+            query = query.vertex
+        );
+        if query.explicit_height != 0 {
+            let normal = explicit_normal(&query.instance, &query.vertex, &query.normals);
+            let apart = normal.distance(there.normal.into());
+            assert!(apart < 1e-4, "{name}: {normal} {there:?} {normals:?}", normals = query.normals);
+        }
+    }
+}
+
+#[test]
+fn vertices_lie_where_the_cpu_says_to_the_bit() {
+    on_device(|gpu| {
+        let coded = mountains();
+        compare(gpu, "16-bit", &coded, 0);
+        compare(gpu, "32-bit", &as_f32(&coded), 0);
+        compare(gpu, "pages of 32", &coded, 5);
+        let mut far = (*coded).clone();
+        far.origin = [4.0e6, -7.0e6];
+        far.spacing = [0.3, 31.7];
+        compare(gpu, "far, narrow cells", &Arc::new(far), 0);
+        compare(gpu, "tiled", &Arc::new((*coded).clone().tiled([3, 2])), 0);
+        let powers = synth::synth(synth::Kind::Fractal, [64, 32], 3).tiled([3, 5]);
+        compare(gpu, "tiled by powers of two", &Arc::new(powers), 0);
+        compare(gpu, "tiled pages", &Arc::new((*coded).clone().tiled([3, 2])), 6);
+    });
+}
