@@ -11,7 +11,7 @@ use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
 use cuesta::lod::sphere_tree::covers::Covers;
 use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
 use cuesta::lod::sphere_tree::lattice::Place;
-use cuesta::lod::sphere_tree::measure::{Known, Measured};
+use cuesta::lod::sphere_tree::measure::{DiamondInfo, Measured};
 use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::lod::sphere_tree::roam::Queues;
 use cuesta::lod::sphere_tree::splits::{Found, Splits};
@@ -71,13 +71,13 @@ fn viewpoint(measured: &Measured, eye: DVec3, px: f64) -> Viewpoint {
 }
 
 /// Every diamond.
-fn diamonds(measured: &Measured) -> Vec<Known> {
+fn diamonds(measured: &Measured) -> Vec<DiamondInfo> {
     let of_level = |level: u32| {
         let [x_count, z_count] = measured.lattice.count(level);
         let places = (0..z_count).flat_map(move |j| (0..x_count).map(move |i| (i, j)));
         places.filter(|(i, j)| (i | j) & 1 == 1).map(move |(i, j)| [i << level, j << level])
     };
-    let known = |at: Place| measured.known(at, measured.lattice.index(at).expect("a diamond"));
+    let known = |at: Place| measured.diamond(at, measured.lattice.index(at).expect("a diamond"));
     (0..measured.lattice.levels()).flat_map(of_level).map(known).collect()
 }
 

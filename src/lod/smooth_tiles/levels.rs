@@ -112,8 +112,8 @@ mod tests {
             restrict(&mut ceilings, size);
             assert!(apart(&ceilings) <= ONE);
             let nearest = |k: usize| {
-                let way = |o: usize| (k % 7).abs_diff(o % 7) + (k / 7).abs_diff(o / 7);
-                (0..35).map(|o| free[o] + ONE * way(o) as u32).min()
+                let distance = |o: usize| (k % 7).abs_diff(o % 7) + (k / 7).abs_diff(o / 7);
+                (0..35).map(|o| free[o] + ONE * distance(o) as u32).min()
             };
             assert!((0..35).all(|k| Some(ceilings[k]) == nearest(k)), "no lower than it must be");
             let step = [0, 700, ONE / 3, 2 * ONE, u32::MAX][random(&mut seed) as usize % 5];

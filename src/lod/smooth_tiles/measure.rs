@@ -55,7 +55,7 @@ impl<'a> Tile<'a> {
         heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)])
     }
 
-    /// Returns the error ε by level, metres, rising. It bounds all that is drawn at the level and, if tiles morph, on
+    /// Returns the error ε by level, metres, rising. It bounds all that is drawn at the level and, if tiles morph, during
     /// the morph to it. It is 0 at level 0: there only a coarser side deviates from the samples, and the tile beyond that
     /// side accounts for it.
     pub fn errors(&self, morphs: bool) -> Vec<f32> {
@@ -64,14 +64,14 @@ impl<'a> Tile<'a> {
         let [low, high] = self.range();
         let rounding = if morphs { low.abs().max(high.abs()) * ROUNDING } else { 0.0 };
         let mut errors = Vec::new();
-        let mut morph = 0.0;
+        let mut morphed = 0.0;
         for level in levels {
             let chunk = chunk::build(self.field, self.place, level);
             let own = if level == 0 { 0.0 } else { self.level_error(&chunk, level) };
-            largest = if morphs { largest * GROWTH } else { largest }.max(own).max(morph);
+            largest = if morphs { largest * GROWTH } else { largest }.max(own).max(morphed);
             // A level without error does not move at all.
             errors.push(if largest > 0.0 { largest + rounding } else { 0.0 });
-            morph = if morphs { self.morph_error(&chunk, level) } else { 0.0 };
+            morphed = if morphs { self.morph_error(&chunk, level) } else { 0.0 };
         }
         errors
     }
@@ -134,7 +134,7 @@ mod tests {
         Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
     }
 
-    /// A sample half morph between a rising vertex of the side and a falling one inside, where the inside morphs first.
+    /// A sample half way between a rising vertex of the side and a falling one inside, where the inside morphs first.
     /// Levels 1 and 2 deviate by 1 m there, and the morph between them by 1.5 m.
     #[test]
     fn morph_error_can_exceed_both_levels() {
