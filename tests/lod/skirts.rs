@@ -60,7 +60,7 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
     let (mut compared, mut skirt_vertex) = (0, 0);
     for (k, rotation) in (0..2).flat_map(|k| (0..4).map(move |rotation| (k, rotation))) {
         // The quadrants after the turn, and how far each has gone over into the next coarser level.
-        let state = cuesta::lod::clusters::states::turned(states[k], rotation);
+        let state = cuesta::lod::clusters::states::rotated(states[k], rotation);
         let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * rotation) % ONE);
         let mut weights = [0; 4];
         for quadrant in 0..4 {

@@ -259,7 +259,7 @@ mod tests {
         let (mut blocks, mut patches) = (blocks(), patches(100));
         blocks.set_visible(&(0..8).collect::<Vec<_>>());
         patches.begin(&Changes::default(), false, &blocks);
-        assert!(store(&mut patches, 9, &piece(40, 1.0), &blocks).0, "out of sight");
+        assert!(store(&mut patches, 9, &piece(40, 1.0), &blocks).0, "invisible");
         assert!(store(&mut patches, 0, &piece(40, 1.0), &blocks).0);
         patches.begin(&Changes::default(), false, &blocks);
         assert!(store(&mut patches, 1, &piece(40, 1.0), &blocks).0);
