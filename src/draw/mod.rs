@@ -308,8 +308,11 @@ impl DrawList {
         self.pending = 0;
     }
 
-    /// The height above zero of an explicit vertex's own height, metres, rounded.
+    /// Height above zero of a vertex's height, metres. Exact where the base is 0, else rounded once.
     pub fn absolute_height(&self, height: f32) -> f32 {
+        if self.height_base == 0.0 {
+            return height;
+        }
         (f64::from(height) + f64::from(self.height_base)) as f32
     }
 

@@ -27,7 +27,7 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
+use super::{Diagnostics, Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{
     Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology, weights,
 };
@@ -277,6 +277,12 @@ impl Technique for GeoMipMap {
         }
     }
 
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Diagnostics for GeoMipMap {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             let mesh = BlockMesh::used(self.blocks.cells, self.masks, finest, alone);

@@ -41,7 +41,7 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
+use super::{Diagnostics, Entry, Gradual, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
     Topology, Upload, VertexNormals, weights,
@@ -335,16 +335,6 @@ impl Technique for SmoothTiles {
         self.visible.iter().for_each(|&tile| self.push(tile, list));
     }
 
-    fn is_settled(&self) -> bool {
-        // The viewer's way is over where the view stays the same.
-        let is_still = self.clock.drive() == Drive::Speed;
-        let stands = |tile: usize| {
-            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
-            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
-        };
-        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
-    }
-
     fn keeps_tolerance(&self) -> bool {
         true
     }
@@ -354,6 +344,28 @@ impl Technique for SmoothTiles {
         PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Gradual for SmoothTiles {
+    fn is_settled(&self) -> bool {
+        // The viewer's way is over where the view stays the same.
+        let is_still = self.clock.drive() == Drive::Speed;
+        let stands = |tile: usize| {
+            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
+            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
+        };
+        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
+    }
+}
+
+impl Diagnostics for SmoothTiles {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             size_of_val(Patterns::new(self.tiles.cells, finest, alone).indices.as_slice()) as u64
