@@ -1,9 +1,18 @@
 //! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`); tells the commit.
 
 #[cfg(feature = "vulkan")]
-#[path = "src/draw/layout.rs"]
+#[path = "src/draw"]
 #[allow(dead_code)]
-mod layout;
+mod draw {
+    pub mod layout;
+}
+#[cfg(feature = "vulkan")]
+#[path = "src/plan"]
+#[allow(dead_code)]
+mod plan {
+    mod colour;
+    pub mod constants;
+}
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -51,7 +60,9 @@ mod shaders {
 
     pub fn compile_all() {
         println!("cargo:rerun-if-changed=shaders");
-        println!("cargo:rerun-if-changed=src/draw/layout.rs");
+        for source in ["src/draw/layout.rs", "src/plan/colour.rs", "src/plan/constants.rs"] {
+            println!("cargo:rerun-if-changed={source}");
+        }
         let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
         let compiler = Compiler::new().expect("shaderc starts");
         let mut table = String::from("&[\n");
@@ -85,7 +96,7 @@ mod shaders {
     }
 
     fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind, define: Option<&str>) -> Result<Vec<u8>, String> {
-        let source = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let source = read(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let mut options = CompileOptions::new().map_err(|e| e.to_string())?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_6);
@@ -98,10 +109,9 @@ mod shaders {
         }
         options.set_include_callback(|name, _, from, _| {
             let content = match name {
-                "layout.glsl" => Ok(super::layout::GLSL.to_string()),
-                _ => {
-                    std::fs::read_to_string(Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}"))
-                }
+                "layout.glsl" => Ok(super::draw::layout::GLSL.to_string()),
+                "constants.glsl" => Ok(super::plan::constants::SceneConstants::glsl()),
+                _ => read(&Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}")),
             };
             content.map(|content| ResolvedInclude { resolved_name: format!("shaders/{name}"), content })
         });
@@ -109,5 +119,10 @@ mod shaders {
             .compile_into_spirv(&source, kind, &path.to_string_lossy(), "main", Some(&options))
             .map(|artifact| artifact.as_binary_u8().to_vec())
             .map_err(|e| e.to_string())
+    }
+
+    /// Reads a source as ASCII: glslang cuts debug strings at any byte, and readers of SPIR-V reject half a character.
+    fn read(path: &Path) -> std::io::Result<String> {
+        Ok(std::fs::read_to_string(path)?.replace(|c: char| !c.is_ascii(), "?"))
     }
 }

@@ -2,7 +2,6 @@
 
 // Layers: grass, rock, scree, snow. A texel: brightness, hue, slopes along its two axes, all around a half.
 layout(set = 0, binding = 4) uniform sampler2DArray materials;
-layout(constant_id = 9) const bool DETAIL = false;
 
 const uint GRASS = 0, ROCK = 1, SCREE = 2, SNOW = 3;
 // A material's colours at both ends of its hue.

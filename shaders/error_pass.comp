@@ -8,7 +8,6 @@
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
-layout(constant_id = 3) const bool HOLES = false;
 
 layout(set = 1, binding = 0, scalar) readonly buffer CapturedBlock { Captured captured[]; };
 // Three records a triangle; those of a ceiling are clockwise seen from above.

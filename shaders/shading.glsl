@@ -8,21 +8,6 @@ layout(set = 0, binding = 3) uniform sampler2D overlay;
 layout(set = 0, binding = 6) uniform sampler2DArray maps;
 layout(set = 0, binding = 7, scalar) readonly buffer MapTable { uint map_table[]; };
 
-layout(constant_id = 3) const bool HOLES = false;
-layout(constant_id = 4) const bool FOG = false;
-// Colours by: 0 height, 1 level, 2 overlay, 3 error, 4 normal, 5 batch, 6 maps, 7 ground, 8 its nodes (plan::Colour).
-layout(constant_id = 5) const uint COLOUR = 0;
-// The height texture can be filtered linearly by the device.
-layout(constant_id = 6) const bool FILTERED = false;
-
-// For the ground: parts of a sample of which 2^32 are the root square's side, as a power of two.
-layout(constant_id = 13) const uint MAP_SHIFT = 0;
-// The overlay's sides in pages, where it is there in parts; 0: it is there as a whole.
-layout(constant_id = 14) const float MAP_COLUMNS = 0.0;
-layout(constant_id = 15) const float MAP_ROWS = 0.0;
-// The overlay ends at its sides: beyond them the land has its own colour.
-layout(constant_id = 16) const bool OVERLAY_ENDS = false;
-
 bool is_hole(ivec2 at) {
     return texelFetch(hole_pages, texel(clamp(at, ivec2(0), frame.last)), 0).r != 0;
 }
@@ -224,7 +209,7 @@ vec3 terrain_colour(vec3 relative, vec2 lattice, vec4 steps, vec3 normal, uvec2 
     float pixel = pixel_at(relative);
     float height = height_of(relative);
 
-    bool is_overlaid = COLOUR == 2 || COLOUR == 6;
+    bool is_overlaid = COLOUR == COLOUR_OVERLAY || COLOUR == COLOUR_MAPS;
     vec2 share = vec2(0.0);
     if (is_overlaid) {
         share = overlay_share(lattice);
@@ -232,25 +217,25 @@ vec3 terrain_colour(vec3 relative, vec2 lattice, vec4 steps, vec3 normal, uvec2 
     }
     vec3 albedo;
     vec3 ground = vec3(0.0);
-    if (DETAIL && (COLOUR == 0 || COLOUR == 2)) {
+    if (DETAIL && (COLOUR == COLOUR_HEIGHT || COLOUR == COLOUR_OVERLAY)) {
         float facing = abs(dot(relative, normal)) / max(distance, 1e-30);
         Spot spot = spot_at(lattice, height, pixel, facing);
         ground = ground_albedo(spot, share_of_range(height), normal);
     }
-    if (COLOUR == 1) albedo = palette(level_batch.x & ~SKIRT);
-    else if (COLOUR == 6 && MAP_COLUMNS != 0.0 && is_overlaid) albedo = tile_colour(tile_at(share));
+    if (COLOUR == COLOUR_LEVEL) albedo = palette(level_batch.x & ~SKIRT);
+    else if (COLOUR == COLOUR_MAPS && MAP_COLUMNS != 0.0 && is_overlaid) albedo = tile_colour(tile_at(share));
     else if (is_overlaid) albedo = overlay_albedo(share, steps);
-    else if (COLOUR == 7) albedo = texels(ground_at(cell));
-    else if (COLOUR == 8) albedo = tile_colour(ground_at(cell));
-    else if (COLOUR == 3) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
-    else if (COLOUR == 5) albedo = palette(level_batch.y);
+    else if (COLOUR == COLOUR_GROUND) albedo = texels(ground_at(cell));
+    else if (COLOUR == COLOUR_NODES) albedo = tile_colour(ground_at(cell));
+    else if (COLOUR == COLOUR_ERROR) albedo = error_colour(abs(height - true_height(cell, is_of_ceiling(relative, lattice))) / max(pixel, 1e-30));
+    else if (COLOUR == COLOUR_BATCH) albedo = palette(level_batch.y);
     else if (DETAIL) albedo = ground;
     else albedo = CEILING ? rock(height) : tint(height, normal);
     // Under a picture from above the ground is lighter or darker than it is on average.
-    if (DETAIL && COLOUR == 2 && is_overlaid) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
+    if (DETAIL && COLOUR == COLOUR_OVERLAY && is_overlaid) albedo *= clamp(dot(ground, vec3(1.0)) / 0.75, 0.5, 1.6);
 
     vec3 colour = albedo;
-    if (COLOUR == 4) {
+    if (COLOUR == COLOUR_NORMAL) {
         colour = normal * 0.5 + 0.5;
     } else if (CEILING) {
         colour *= lamplight(relative, distance, normal);

@@ -80,7 +80,7 @@ impl Pipelines {
             name: "sky",
             vertex: "sky.vert",
             fragment: Some("sky.frag"),
-            constants: &Constants::new(&[]),
+            constants: &Constants::none(),
             input: vk::PipelineVertexInputStateCreateInfo::default(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             wireframe: false,

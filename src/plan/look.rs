@@ -2,44 +2,13 @@
 
 use glam::DVec3;
 
+use super::colour::Colour;
 use super::features::overlay_bytes;
 use super::forced::Forced;
 use crate::draw::layout::Frame;
 use crate::height::Field;
 use crate::texture::drape::Drape;
 use crate::view::{Lens, View};
-
-/// What a fragment's colour says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Colour {
-    /// Hypsometric tint.
-    #[default]
-    Height = 0,
-    /// Level of detail.
-    Level = 1,
-    /// A picture laid over the field.
-    Overlay = 2,
-    /// Distance of the drawn surface from the samples' own, in pixels.
-    Error = 3,
-    /// Surface normal.
-    Normal = 4,
-    /// Draw.
-    Batch = 5,
-    /// Which map of the picture, where that is there in parts: its level, and where it ends.
-    Maps = 6,
-    /// A ground whose texels are made where they are seen ([`ground`](crate::texture::ground)).
-    Ground = 7,
-    /// Which node of the ground's map serves: its level, and where it ends.
-    Nodes = 8,
-}
-
-impl Colour {
-    /// Whether texels of the ground are needed for it.
-    pub fn shows_ground(self) -> bool {
-        matches!(self, Colour::Ground | Colour::Nodes)
-    }
-}
 
 /// How the land is to look.
 #[derive(Clone, Copy, Debug, PartialEq)]

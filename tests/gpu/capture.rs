@@ -19,9 +19,10 @@ use super::{as_f32, aslant, difference, mountains, on_device, technique};
 
 fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     let mut renderer =
         Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, view.size).unwrap();
     renderer.draw(technique, view, Copy::PictureAndDepth).unwrap();

@@ -107,9 +107,10 @@ fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
 fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph, fraction_bits: i32) {
     let view = aslant(field, [320, 200], 2.0);
     let frame = Frame { fraction_bits, ..Frame::placing(field, &view) };
-    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
-        .unwrap()
-        .with_requirements(PipelineRequirements { morph, seams: Seams::Skirts, ..PipelineRequirements::default() });
+    let mut plan = ScenePlan::builder(field, &Look::default(), &gpu.device_limits())
+        .requirements(PipelineRequirements { morph, seams: Seams::Skirts, ..PipelineRequirements::default() })
+        .build()
+        .unwrap();
     plan.page_shift = page_shift;
     let queries = queries(field, &view, morph);
     let device = position_check::answers(gpu, &plan, field, &frame, &queries).unwrap();
