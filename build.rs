@@ -5,6 +5,13 @@
 #[allow(dead_code)]
 mod draw {
     pub mod layout;
+    pub mod shared;
+}
+#[cfg(feature = "vulkan")]
+#[path = "src/lod/clusters"]
+#[allow(dead_code)]
+mod clusters {
+    pub mod layout;
 }
 #[cfg(feature = "vulkan")]
 #[path = "src/plan"]
@@ -60,8 +67,8 @@ mod shaders {
 
     pub fn compile_all() {
         println!("cargo:rerun-if-changed=shaders");
-        for source in ["src/draw/layout.rs", "src/plan/colour.rs", "src/plan/constants.rs"] {
-            println!("cargo:rerun-if-changed={source}");
+        for source in ["draw/shared", "draw/layout", "lod/clusters/layout", "plan/colour", "plan/constants"] {
+            println!("cargo:rerun-if-changed=src/{source}.rs");
         }
         let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
         let compiler = Compiler::new().expect("shaderc starts");
@@ -110,6 +117,7 @@ mod shaders {
         options.set_include_callback(|name, _, from, _| {
             let content = match name {
                 "layout.glsl" => Ok(super::draw::layout::GLSL.to_string()),
+                "clusters.glsl" => Ok(super::clusters::layout::GLSL.to_string()),
                 "constants.glsl" => Ok(super::plan::constants::SceneConstants::glsl()),
                 _ => read(&Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}")),
             };

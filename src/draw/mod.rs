@@ -6,12 +6,14 @@ pub mod gpu_selection;
 pub mod layout;
 pub mod normals;
 pub mod place;
+pub mod shared;
 pub mod skirts;
 pub mod weights;
 
 use std::ops::Range;
 
 pub use gpu_selection::GpuSelection;
+use layout::VertexFormat;
 pub use layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 pub use normals::Normals;
 
@@ -306,6 +308,11 @@ impl DrawList {
         self.reach_m = f64::INFINITY;
         self.tolerance_scale = 1.0;
         self.pending = 0;
+    }
+
+    /// The encoding of its explicit vertices.
+    pub fn vertex_format(&self) -> VertexFormat {
+        VertexFormat { fraction_bits: self.fraction_bits as i32, height_base: self.height_base }
     }
 
     /// Height above zero of a vertex's height, metres. Exact where the base is 0, else rounded once.

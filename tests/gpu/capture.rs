@@ -44,7 +44,7 @@ fn assert_same(
     name: &str,
 ) {
     let captured = renderer.capture(technique, view).unwrap();
-    let frame = Frame { fraction_bits: renderer.list.fraction_bits as i32, ..Frame::placing(field, view) };
+    let frame = Frame::placing(field, view).with_fractions(renderer.list.fraction_bits);
     let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &renderer.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
     assert_eq!(expanded[1].is_empty(), technique.pipeline_requirements().seams == Seams::Shared, "{name}");

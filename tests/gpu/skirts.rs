@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements, skirts};
+use cuesta::draw::weights::SkirtWeights;
+use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -31,8 +32,8 @@ impl Technique for Deeper {
     fn select(&mut self, view: &View, list: &mut DrawList) {
         self.inner.select(view, list);
         for instance in &mut list.instances {
-            let [_, sides, depth, _] = instance.weights;
-            skirts::set(&mut instance.weights, sides, self.factor * f32::from_bits(depth));
+            let weights = SkirtWeights::of(instance);
+            *instance = instance.with_weights(SkirtWeights { depth_m: self.factor * weights.depth_m, ..weights });
         }
     }
     fn keeps_tolerance(&self) -> bool {

@@ -26,6 +26,7 @@
 
 mod collapse;
 mod gpu_selection;
+pub mod layout;
 mod lod_evaluator;
 pub mod mesh;
 mod morph_ranges;

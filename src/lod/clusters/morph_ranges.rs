@@ -7,7 +7,8 @@
 //! level of each other, and where two levels meet the finer one has gone all its way and the coarser one has not begun.
 
 use super::tree::Tree;
-use crate::draw::distance::{END, weights};
+use crate::draw::distance::{MORPH_END, weights};
+use crate::draw::weights::DistanceWeights;
 use crate::height::bounds::{Bounds, ROUNDING};
 use crate::height::{Field, level_errors};
 use crate::view::{Lens, Metric, View};
@@ -19,7 +20,7 @@ const GUARD: f64 = 1.001;
 pub const MORPH_RANGES: usize = 32;
 
 /// Where a way has ended for all of a node, the square of the distance over that of its beginning: no rounding matters.
-pub const NODE_END: f32 = END * 1.0001;
+pub const NODE_END: f32 = MORPH_END * 1.0001;
 
 /// Distances end here, metres.
 const FARTHEST_M: f64 = 1e12;
@@ -65,13 +66,13 @@ impl MorphRanges {
             let allowed_m = allowed_from_m(view, tree.error(level, 0.0).into());
             let begin_m = GUARD * (allowed_m + cell_m).max(ended_m).min(FARTHEST_M);
             ranges[level as usize] = (1.0 / (begin_m * begin_m)) as f32;
-            ended_m = GUARD * f64::from(END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
+            ended_m = GUARD * f64::from(MORPH_END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
         }
         Self { ranges, above_squared: (above * above) as f32 }
     }
 
     /// The weights of an instance of a level.
-    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> [u32; 4] {
+    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> DistanceWeights {
         // A root goes nowhere.
         let into = |level: u32| self.ranges.get(level as usize).copied().unwrap_or(0.0);
         weights(staying, finer, [into(level + 1), into(level)], self.above_squared)

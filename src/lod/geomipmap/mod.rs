@@ -29,7 +29,8 @@ use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
 use super::{Diagnostics, Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{
-    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology, weights,
+    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -156,7 +157,7 @@ impl GeoMipMap {
     /// blocks: it is where either of them goes over, and the other one's bound covers it, being at most a level
     /// behind. Where blocks stick out of the field midpoints are none, so the inside of such a block and a side
     /// between two of them stay.
-    fn weights(&self, block: usize) -> [u32; 4] {
+    fn weights(&self, block: usize) -> SlotWeights {
         let base = self.level(block) * ONE;
         let partial = |block| self.blocks.is_partial(block);
         let weight = |level: u32, stays: bool| {
@@ -164,7 +165,7 @@ impl GeoMipMap {
             (level - base) / (ONE / weights::ONE)
         };
         let edge = |other: usize| weight(self.levels[block].max(self.levels[other]), partial(block) && partial(other));
-        weights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
+        SlotWeights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
     }
 
     fn instance(&self, block: usize) -> Instance {
@@ -172,15 +173,14 @@ impl GeoMipMap {
         let level = self.level(block);
         let (_, rotation) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
-        Instance {
+        let instance = Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
-            shift: 0,
             rotation: rotation.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
             level,
-            batch: 0,
-            weights: if self.morph { self.weights(block) } else { [0; 4] },
-        }
+            ..Instance::default()
+        };
+        if self.morph { instance.with_weights(self.weights(block)) } else { instance }
     }
 
     /// Sorts what is visible into runs of the same level and border and appends their instances.

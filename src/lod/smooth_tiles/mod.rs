@@ -44,7 +44,8 @@ use self::tiles::Tiles;
 use super::{Diagnostics, Entry, Gradual, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
-    Topology, Upload, VertexNormals, weights,
+    Topology, Upload, VertexNormals,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -279,7 +280,7 @@ impl SmoothTiles {
         let place = self.tiles.place(tile);
         let (mask, weights) = self.border(tile);
         let (origin, cells) = (place.origin, place.cells as u32);
-        list.instances.push(Instance { origin, cells, level, batch, weights, ..Instance::default() });
+        list.instances.push(Instance { origin, cells, level, batch, ..Instance::default() }.with_weights(weights));
         let border = self.patterns.border(level, mask, self.tiles.is_odd(tile));
         for indices in [self.patterns.centres[level as usize].clone(), border] {
             if !indices.is_empty() {
@@ -291,7 +292,7 @@ impl SmoothTiles {
     }
 
     /// Which sides meet coarser tiles, and how far the tile's inside and its sides have gone.
-    fn border(&self, tile: usize) -> (usize, [u32; 4]) {
+    fn border(&self, tile: usize) -> (usize, SlotWeights) {
         let base = self.queue.levels[tile];
         let is_partial = self.tiles.is_partial(tile);
         let weight = |level: u32| (level - base * ONE) / (ONE / weights::ONE);
@@ -306,7 +307,7 @@ impl SmoothTiles {
             sides[side] = weight(if stays { coarser * ONE } else { self.levels[tile].max(self.levels[other]) });
         }
         let inside = if is_partial { 0 } else { weight(self.levels[tile]) };
-        (mask, weights::uniform(inside, sides))
+        (mask, SlotWeights::uniform(inside, sides))
     }
 }
 
