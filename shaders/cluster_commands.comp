@@ -23,12 +23,14 @@ void main() {
         bool is_drawn = scratch.overflow != 0 || is_root_in_sight();
         tally.draws = is_drawn ? 1 : 0;
         commands[0] = of_seed(0, 0, 1);
-        instances[0] = placed(Node(tree.root, uvec2(0)), tree.root);
-        if (tree.skirts == 0) instances[0].cells = 2 * tree.cells;
+        Instance root = placed(Node(tree.root, uvec2(0)), tree.root);
+        if (tree.skirts == 0) root.cells = 2 * tree.cells;
+        else root = with_weights(root, SkirtWeights(0, 0, 0.0));
+        // The root has no coarser level to morph to.
         if (view.metric == DISTANCE) {
-            // It goes nowhere.
-            instances[0].weights = uvec4(BY_DISTANCE * 0x01010101, 0, floatBitsToUint(ranges[tree.root]), floatBitsToUint(view.above_squared));
+            root = with_weights(root, DistanceWeights(0, 0.0, ranges[tree.root], view.above_squared));
         }
+        instances[0] = root;
         return;
     }
     uint draws = 0, first = 0;

@@ -2,6 +2,7 @@
 // tree.rs and height/bounds.rs below it), name by name and to the bit.
 #extension GL_EXT_scalar_block_layout : require
 #include "layout.glsl"
+#include "clusters.glsl"
 
 layout(set = 0, binding = 0, scalar) readonly buffer TreeBlock { ClusterTree tree; uint words[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer ViewBlock { ClusterView view; float ranges[]; };
@@ -13,9 +14,6 @@ const float DEEPEST = 1e10;
 const float MIN_SQUARE = 1e-18;
 const float MIN_ERROR = 1e-12;
 const float WITHOUT_ERROR = 1e30;
-const uint CERTIFIED = 0;
-const uint PAPER = 1;
-const uint DISTANCE = 3;
 
 const int OUTSIDE = 0;
 const int CROSSING = 1;
@@ -97,10 +95,10 @@ bool square(Node node, out Square known) {
 }
 
 vec3 corner(uvec2 at, float height) {
-    precise vec2 metres = vec2(ivec2(at) - view.render_origin) * view.spacing;
-    precise vec2 moved = metres + view.render_origin_relative;
-    precise float above = height - view.render_origin_height;
-    precise float y = above + view.render_origin_height_relative;
+    precise vec2 metres = vec2(ivec2(at) - view.origin.at) * view.spacing;
+    precise vec2 moved = metres + view.origin.relative;
+    precise float above = height - view.origin.height;
+    precise float y = above + view.origin.height_relative;
     return min(max(vec3(moved.x, y, moved.y), -FARTHEST), FARTHEST);
 }
 

@@ -24,5 +24,5 @@ uint rotation_of(uint state) {
 Instance placed(Node node, uint level) {
     ivec2 origin = ivec2(node.at * side_of(node.level));
     uint cells = tree.skirts == 0 ? 4 * tree.cells : 4 * tree.cells + 5;
-    return Instance(origin, cells, int(level) - 1, 0, level, 0, uvec4(0));
+    return Instance(origin, cells, int(level) - 1, 0, level, 0, SLOT_WEIGHTS, uvec4(0));
 }

@@ -68,21 +68,21 @@ float gap_m(Node block, uint side) {
     return rounded;
 }
 
-void hang_skirts(Node node, uint state) {
-    float depth = 0.0;
+SkirtWeights hanging_skirts(Node node, uint state) {
+    SkirtWeights weights = SkirtWeights(0, 0, 0.0);
     for (uint quadrant = 0; quadrant < 4; ++quadrant) {
         uint holds = state_at(state, quadrant);
         for (uint k = 0; k < (holds == BLOCK ? 1 : holds == FOUR_BLOCKS ? 4 : 0); ++k) {
             Node block = child(node, quadrant);
             if (holds == FOUR_BLOCKS) block = child(block, k);
-            set(0, quadrant, edge(block).weight | (holds == FOUR_BLOCKS ? FINER : 0));
+            weights.inside |= (edge(block).weight | (holds == FOUR_BLOCKS ? FINER : 0)) << (8 * quadrant);
             for (uint side = 0; side < 4; ++side) {
                 float gap = gap_m(block, side);
                 if (gap < 0.0) continue;
-                weights[1] |= 1u << (4 * quadrant + side);
-                depth = max(depth, gap);
+                weights.sides |= 1u << (4 * quadrant + side);
+                weights.depth_m = max(weights.depth_m, gap);
             }
         }
     }
-    weights[2] = floatBitsToUint(depth);
+    return weights;
 }

@@ -2,7 +2,6 @@
 
 // Layers: grass, rock, scree, snow. A texel: brightness, hue, slopes along its two axes, all around a half.
 layout(set = 0, binding = 4) uniform sampler2DArray materials;
-layout(constant_id = 9) const bool DETAIL = false;
 
 const uint GRASS = 0, ROCK = 1, SCREE = 2, SNOW = 3;
 // A material's colours at both ends of its hue.
@@ -29,8 +28,8 @@ struct Material { vec3 albedo; vec2 slope; };
 // `pixel`: metres across the line of sight; `facing`: its cosine with the normal. Land seen from aside is drawn out over
 // several pixels: it is blurred less than along its length, which is as far as one look goes.
 Spot spot_at(vec2 lattice, float height, float pixel, float facing) {
-    vec2 plan = (lattice + frame.detail_first) * frame.detail_scale;
-    float per_metre = frame.detail_scale.x / frame.spacing.x;
+    vec2 plan = (lattice + frame.textures.detail_first) * frame.textures.detail_scale;
+    float per_metre = frame.textures.detail_scale.x / frame.heights.spacing.x;
     float across = pixel * clamp(0.4 / max(facing, 1e-3), 1.0, 8.0);
     return Spot(vec3(plan.x, height * per_metre, plan.y), log2(max(across * per_metre, 1e-9)) + SIDE, 0.0);
 }

@@ -21,7 +21,7 @@ void emit_vertex(ivec2 at, float height, uint level, uint batch) {
     // Relative to the anchor: exact near the eye, however large the field.
     out_lattice = from_render_origin(at);
     out_level_batch = uvec2(level, batch);
-    gl_Position = frame.clip_from_relative * vec4(out_relative, 1.0);
+    gl_Position = frame.camera.clip_from_relative * vec4(out_relative, 1.0);
 #ifdef CAPTURE
     capture(at, height);
 #endif

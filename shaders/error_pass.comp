@@ -8,7 +8,6 @@
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 2) uniform usampler2DArray hole_pages;
-layout(constant_id = 3) const bool HOLES = false;
 
 layout(set = 1, binding = 0, scalar) readonly buffer CapturedBlock { Captured captured[]; };
 // Three records a triangle; those of a ceiling are clockwise seen from above.
@@ -37,7 +36,7 @@ bool in_view(vec4 clip) {
 
 // Exact displacement on the screen of moving a point vertically, without the difference of two projections.
 float displacement_px(vec4 clip, float metres) {
-    vec4 up = frame.clip_from_relative[1];
+    vec4 up = frame.camera.clip_from_relative[1];
     float end = clip.w + metres * up.w;
     if (end <= 0.0) return uintBitsToFloat(0x7f800000);
     return length(metres * (up.xy * clip.w - clip.xy * up.w) / (clip.w * end) * given.half_size);
@@ -57,9 +56,9 @@ void main() {
     }
     TriangleError found = TriangleError(0, 0.0, 0.0, 0.0, 0.0);
     // Samples: the first at or after the triangle's western and northern ends, the last at or before the others.
-    int unit = 1 << frame.fraction_bits;
-    ivec2 first = (min(a.position, min(b.position, c.position)) + (unit - 1)) >> frame.fraction_bits;
-    ivec2 last = max(a.position, max(b.position, c.position)) >> frame.fraction_bits;
+    int unit = 1 << frame.vertices.fraction_bits;
+    ivec2 first = (min(a.position, min(b.position, c.position)) + (unit - 1)) >> frame.vertices.fraction_bits;
+    ivec2 last = max(a.position, max(b.position, c.position)) >> frame.vertices.fraction_bits;
     for (int z = first.y; z <= last.y; ++z) {
         for (int x = first.x; x <= last.x; ++x) {
             ivec2 at = ivec2(x, z), fine = at * unit;
@@ -73,9 +72,9 @@ void main() {
             vec3 above = vec3(a.height, b.height, c.height) - truth;
             float metres = dot(vec3(weights), above) / float(area);
             vec3 relative = relative_position(fine, truth) + vec3(0.0, metres, 0.0);
-            vec4 clip = frame.clip_from_relative * vec4(relative, 1.0);
+            vec4 clip = frame.camera.clip_from_relative * vec4(relative, 1.0);
             if (!in_view(clip)) continue;
-            ivec2 towards = ivec2(at.x < frame.last.x ? 1 : -1, at.y < frame.last.y ? 1 : -1);
+            ivec2 towards = ivec2(at.x < frame.heights.last.x ? 1 : -1, at.y < frame.heights.last.y ? 1 : -1);
             bool counts = owns_side(fine, b.position, c.position, towards)
                 && owns_side(fine, c.position, a.position, towards) && owns_side(fine, a.position, b.position, towards);
             float px = displacement_px(clip, -metres);

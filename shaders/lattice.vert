@@ -11,5 +11,5 @@ layout(location = 0) in ivec2 in_position;
 void main() {
     Instance instance = instance_attributes();
     Placed placed = placed(instance, in_position);
-    emit_vertex(placed.at << frame.fraction_bits, placed.height, placed.level, instance.batch);
+    emit_vertex(placed.at << frame.vertices.fraction_bits, placed.height, placed.level, instance.batch);
 }

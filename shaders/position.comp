@@ -21,7 +21,7 @@ void main() {
     ExplicitVertex vertex = query.vertex;
     if (query.explicit_height == 0) {
         Placed placed = placed(query.instance, vertex.position);
-        answers[k] = Answer(relative_position(placed.at << frame.fraction_bits, placed.height), vec3(0.0));
+        answers[k] = Answer(relative_position(placed.at << frame.vertices.fraction_bits, placed.height), vec3(0.0));
     } else {
         float height = explicit_height(query.instance, vertex);
         vec3 position = relative_position(explicit_position(query.instance, vertex), height);

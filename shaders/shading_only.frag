@@ -22,7 +22,7 @@ void main() {
     }
     vec4 point = in_far + depth * in_near;
     vec3 relative = point.xyz / point.w;
-    vec2 lattice = (relative.xz - frame.render_origin_relative) / frame.spacing;
+    vec2 lattice = (relative.xz - frame.camera.origin.relative) / frame.heights.spacing;
     // At edges of the land the step is between two surfaces: that costs no more.
     vec4 steps = vec4(dFdx(lattice), dFdy(lattice));
     out_colour = vec4(terrain_colour(relative, lattice, steps, normal_at(relative, lattice), uvec2(0)), 1.0);

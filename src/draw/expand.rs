@@ -80,7 +80,7 @@ fn each_triangle(
     mut visit: impl FnMut(Drawn),
 ) {
     let geometry = geometry(draw.source, resident, list);
-    let frame = &Frame { fraction_bits: list.fraction_bits as i32, ..*frame };
+    let frame = &frame.with_fractions(list.fraction_bits);
     let placed = |instance: u32| &list.instances[instance as usize];
     let corner = |instance, index| {
         let corner = corner(field, frame, geometry, draw.source, placed(instance), index);
@@ -132,7 +132,7 @@ fn corner(
     match source {
         Source::Lattice => {
             let placed = placed(field, frame, instance, geometry.lattice[index as usize].position);
-            let [x, z] = placed.at.map(|n| n << frame.fraction_bits);
+            let [x, z] = placed.at.map(|n| n << frame.vertices.fraction_bits);
             Corner { x, z, y: placed.height }
         }
         Source::Resident | Source::Streamed => {

@@ -6,12 +6,14 @@ pub mod gpu_selection;
 pub mod layout;
 pub mod normals;
 pub mod place;
+pub mod shared;
 pub mod skirts;
 pub mod weights;
 
 use std::ops::Range;
 
 pub use gpu_selection::GpuSelection;
+use layout::VertexFormat;
 pub use layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 pub use normals::Normals;
 
@@ -308,8 +310,16 @@ impl DrawList {
         self.pending = 0;
     }
 
-    /// The height above zero of an explicit vertex's own height, metres, rounded.
+    /// The encoding of its explicit vertices.
+    pub fn vertex_format(&self) -> VertexFormat {
+        VertexFormat { fraction_bits: self.fraction_bits as i32, height_base: self.height_base }
+    }
+
+    /// Height above zero of a vertex's height, metres. Exact where the base is 0, else rounded once.
     pub fn absolute_height(&self, height: f32) -> f32 {
+        if self.height_base == 0.0 {
+            return height;
+        }
         (f64::from(height) + f64::from(self.height_base)) as f32
     }
 

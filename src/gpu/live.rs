@@ -208,19 +208,17 @@ fn joined(phi: &Instruction, block: Word, edges: &BTreeSet<(Word, Word)>, values
 mod tests {
     use super::*;
     use crate::gpu::shaders;
+    use crate::plan::{Colour, SceneConstants};
 
     /// Each constant of the fragment program that is off saves something, and what is decided is at most what is not.
     #[test]
     fn what_constants_decide_is_not_counted() {
         let words = shaders::words("terrain.frag");
-        let off = [0; 13];
-        let lean = instructions(&words, &off);
-        let with = |k: usize, value: u32| {
-            let mut values = off;
-            values[k] = value;
-            instructions(&words, &values)
-        };
-        let [holes, fog, overlay] = [with(3, 1), with(4, 1), with(5, 2)];
+        let off = SceneConstants::default();
+        let count = |constants: SceneConstants| instructions(&words, &constants.words());
+        let lean = count(off);
+        let [holes, fog] = [SceneConstants { holes: true, ..off }, SceneConstants { fog: true, ..off }].map(count);
+        let overlay = count(SceneConstants { colour: Colour::Overlay, ..off });
         println!("terrain.frag: {lean} instructions; holes {holes}, fog {fog}, overlay {overlay}");
         assert!(lean > 50 && holes > lean && fog > lean);
         assert_ne!(overlay, lean);

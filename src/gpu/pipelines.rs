@@ -80,7 +80,7 @@ impl Pipelines {
             name: "sky",
             vertex: "sky.vert",
             fragment: Some("sky.frag"),
-            constants: &Constants::new(&[]),
+            constants: &Constants::none(),
             input: vk::PipelineVertexInputStateCreateInfo::default(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             wireframe: false,
@@ -334,7 +334,8 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
         (11, UINT, offset_of!(Instance, rotation)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
-        (14, WEIGHTS, offset_of!(Instance, weights)),
+        (14, UINT, offset_of!(Instance, weights_kind)),
+        (15, WEIGHTS, offset_of!(Instance, weights_words)),
     ];
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (stride as u32, attributes)

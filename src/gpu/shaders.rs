@@ -4,7 +4,6 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
-use crate::draw::{Morph, Seams};
 use crate::plan::ScenePlan;
 
 /// File name of the source and SPIR-V of every shader (made by build.rs).
@@ -29,51 +28,36 @@ pub fn module(gpu: &Gpu, name: &str) -> Result<vk::ShaderModule> {
     Ok(module)
 }
 
-/// Bytes and map of specialization constants, ids counting from 0, four bytes each.
+/// Values of specialization constants, as pipelines take them: ids count from 0, four bytes each.
 pub struct Constants {
-    data: Vec<u32>,
+    words: Vec<u32>,
     entries: Vec<vk::SpecializationMapEntry>,
 }
 
 impl Constants {
-    /// Constants with these values, in the order of their ids.
-    pub fn new(values: &[u32]) -> Self {
-        let entry = |k: u32| vk::SpecializationMapEntry { constant_id: k, offset: 4 * k, size: 4 };
-        Self { data: values.to_vec(), entries: (0..values.len() as u32).map(entry).collect() }
+    /// The constants of a scene's shaders.
+    pub fn of(plan: &ScenePlan) -> Self {
+        Self::new(plan.constants().words())
     }
 
-    /// What a scene's shaders leave out, in the order of their `constant_id`s.
-    pub fn of(plan: &ScenePlan) -> Self {
-        let flag = u32::from;
-        let extent = plan.maps.map_or([0.0; 2], |cut| cut.extent).map(|pages| (pages as f32).to_bits());
-        Self::new(&[
-            flag(plan.coded),
-            flag(plan.tiled),
-            plan.page_shift,
-            flag(plan.holes),
-            flag(plan.fog),
-            plan.colour as u32,
-            flag(plan.filtered),
-            flag(plan.requirements.morph != Morph::No),
-            flag(plan.requirements.seams == Seams::Skirts),
-            flag(plan.detail),
-            flag(plan.requirements.morph == Morph::ByDistance),
-            flag(plan.stored.iter().all(|n| n.is_power_of_two())),
-            flag(plan.ceiling),
-            plan.ground.map_or(0, |cut| 32 - cut.root_shift),
-            extent[0],
-            extent[1],
-            flag(plan.drape.ends),
-        ])
+    /// No constants: every one keeps its default.
+    pub fn none() -> Self {
+        Self::new(Vec::new())
+    }
+
+    fn new(words: Vec<u32>) -> Self {
+        let entry = |k: u32| vk::SpecializationMapEntry { constant_id: k, offset: 4 * k, size: 4 };
+        let entries = (0..words.len() as u32).map(entry).collect();
+        Self { words, entries }
     }
 
     /// The values in the order of their ids.
     pub fn words(&self) -> &[u32] {
-        &self.data
+        &self.words
     }
 
     /// The description for a pipeline stage.
     pub fn info(&self) -> vk::SpecializationInfo<'_> {
-        vk::SpecializationInfo::default().data(bytemuck::cast_slice(&self.data)).map_entries(&self.entries)
+        vk::SpecializationInfo::default().data(bytemuck::cast_slice(&self.words)).map_entries(&self.entries)
     }
 }

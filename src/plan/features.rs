@@ -1,6 +1,5 @@
 //! The features of a plan: when each is kept and why, what it takes, and how it is forced.
 
-use super::look::Colour;
 use super::{Decision, ScenePlan};
 use crate::draw::layout::{ExplicitVertex, VertexNormals};
 use crate::draw::{DepthMode, DeviceGeometry, Geometry, Limits, Morph, Normals, Seams};
@@ -208,7 +207,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "overlay",
-        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_none(),
+        is_kept: |plan, _| plan.colour.shows_overlay() && plan.maps.is_none(),
         kept: "asked for",
         left_out: "no picture is laid over as a whole",
         by_technique: false,
@@ -217,7 +216,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "texture maps",
-        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_some(),
+        is_kept: |plan, _| plan.colour.shows_overlay() && plan.maps.is_some(),
         kept: "the picture exceeds the memory for it, or one image",
         left_out: "no picture exceeds the memory for it",
         by_technique: false,
@@ -309,10 +308,6 @@ impl Feature {
 }
 
 impl ScenePlan {
-    fn shows_picture(&self) -> bool {
-        matches!(self.colour, Colour::Overlay | Colour::Maps)
-    }
-
     /// What is kept and what is left out, in that order, for a technique that keeps this on the device; without one
     /// only what the scene decides.
     pub fn decisions(&self, field: &Field, technique: Option<&DeviceGeometry>) -> (Vec<Decision>, Vec<Decision>) {
@@ -330,7 +325,7 @@ impl ScenePlan {
 mod tests {
     use super::*;
     use crate::height::{Holes, Samples};
-    use crate::plan::{DeviceLimits, Look};
+    use crate::plan::{Colour, DeviceLimits, Look};
 
     /// A picture is there as a whole where that fits, in parts where it does not, and either says why.
     #[test]
@@ -339,8 +334,7 @@ mod tests {
         let device = DeviceLimits { image_side: 4096, image_layers: 256, filters_heights: true };
         let reasons = |size: Option<[u32; 2]>, texture_bytes: u64| {
             let look = Look { colour: Colour::Overlay, texture_bytes, ..Look::default() };
-            let plan = ScenePlan::new(&field, &look, &device).unwrap();
-            let plan = plan.with_overlay(&field, &look, &device, size)?;
+            let plan = ScenePlan::builder(&field, &look, &device).overlay(size).build()?;
             let (kept, left_out) = plan.decisions(&field, None);
             let is_of_picture = |d: &&Decision| ["overlay", "texture maps"].contains(&d.feature);
             assert_eq!(kept.iter().chain(&left_out).filter(is_of_picture).count(), 2);

@@ -2,44 +2,13 @@
 
 use glam::DVec3;
 
+use super::colour::Colour;
 use super::features::overlay_bytes;
 use super::forced::Forced;
-use crate::draw::layout::Frame;
+use crate::draw::layout::{Frame, Lighting, SurfaceTextures};
 use crate::height::Field;
 use crate::texture::drape::Drape;
-use crate::view::{Lens, View};
-
-/// What a fragment's colour says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Colour {
-    /// Hypsometric tint.
-    #[default]
-    Height = 0,
-    /// Level of detail.
-    Level = 1,
-    /// A picture laid over the field.
-    Overlay = 2,
-    /// Distance of the drawn surface from the samples' own, in pixels.
-    Error = 3,
-    /// Surface normal.
-    Normal = 4,
-    /// Draw.
-    Batch = 5,
-    /// Which map of the picture, where that is there in parts: its level, and where it ends.
-    Maps = 6,
-    /// A ground whose texels are made where they are seen ([`ground`](crate::texture::ground)).
-    Ground = 7,
-    /// Which node of the ground's map serves: its level, and where it ends.
-    Nodes = 8,
-}
-
-impl Colour {
-    /// Whether texels of the ground are needed for it.
-    pub fn shows_ground(self) -> bool {
-        matches!(self, Colour::Ground | Colour::Nodes)
-    }
-}
+use crate::view::View;
 
 /// How the land is to look.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,29 +73,31 @@ impl Look {
         DVec3::new(azimuth.sin() * altitude.cos(), altitude.sin(), -azimuth.cos() * altitude.cos())
     }
 
-    /// All that a frame needs for this view of the field; `range` is the tint's, metres.
+    /// The shader constants of a view of the field. `range`: lowest and highest sample, metres.
     pub fn frame(&self, field: &Field, view: &View, range: [f32; 2]) -> Frame {
-        let (slope, size) = match view.lens {
-            Lens::Perspective { .. } => (1.0 / view.focal_px(), 0.0),
-            Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
-        };
         let placing = Frame::placing(field, view);
-        let overlay = self.drape_over(field).shares(placing.render_origin);
-        let repeats = |k: usize| Repeats::new(placing.render_origin[k], field.spacing[k]);
         Frame {
-            height_range: tinted_range(field, range),
-            lamp_reach: lamp_reach(field, view.eye, range),
-            sun: self.towards_sun().as_vec3().to_array(),
-            fog_density: self.fog as f32,
+            lighting: Lighting {
+                sun: self.towards_sun().as_vec3().to_array(),
+                fog_density: self.fog as f32,
+                lamp_reach: lamp_reach(field, view.eye, range),
+                tint_range: tinted_range(field, range),
+            },
+            textures: self.textures(field, placing.camera.origin.at),
+            ..placing
+        }
+    }
+
+    fn textures(&self, field: &Field, render_origin: [i32; 2]) -> SurfaceTextures {
+        let overlay = self.drape_over(field).shares(render_origin);
+        let repeats = |k: usize| Repeats::new(render_origin[k], field.spacing[k]);
+        SurfaceTextures {
             detail_first: [0, 1].map(|k| repeats(k).first),
             detail_scale: [0, 1].map(|k| repeats(k).scale),
             overlay_first: overlay.first,
             overlay_scale: overlay.scale,
             overlay_period: overlay.period,
             overlay_start: overlay.start,
-            pixel_slope: slope as f32,
-            pixel_size: size as f32,
-            ..placing
         }
     }
 }

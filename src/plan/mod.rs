@@ -1,18 +1,23 @@
 //! What a scene needs, and therefore what is left out: worked out before anything is made on the device, and
 //! everything on the device is made from it alone.
 
+mod builder;
+mod colour;
+mod constants;
 pub mod features;
 pub mod forced;
 mod look;
 
-use crate::draw::{DepthMode, DrawKinds, PipelineRequirements};
-use crate::height::{Field, Samples};
+use crate::draw::{DepthMode, DrawKinds, Morph, PipelineRequirements, Seams};
 use crate::texture::drape::Drape;
 use crate::texture::virtual_ground::VirtualGroundLayout;
 use crate::texture::virtual_overlay::VirtualTextureLayout;
+pub use builder::ScenePlanBuilder;
+pub use colour::Colour;
+pub use constants::SceneConstants;
 pub use features::{FEATURES, Feature, mip_levels};
 pub use forced::Forced;
-pub use look::{Colour, Look};
+pub use look::Look;
 
 /// What the device allows, as far as the plan depends on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,56 +105,21 @@ pub struct Decision {
 }
 
 impl ScenePlan {
-    /// The plan for a field and a look, or which limit of the device the field exceeds, or that its bytes do not hold the
-    /// few parts of the ground that there must be.
-    pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
-        let (stored, is_endless) = (field.stored(), field.procedural().is_some());
-        let page_shift = page_shift(stored, device);
-        let mut plan = Self {
-            coded: matches!(field.samples(), Samples::Coded { .. }),
-            tiled: field.is_tiled(),
-            holes: field.holes().count() > 0,
-            ceiling: field.ceiling().is_some(),
-            fog: look.fog > 0.0,
-            // Without samples there is nothing to be compared with.
-            colour: if is_endless && look.colour == Colour::Error { Colour::Height } else { look.colour },
-            wireframe: look.wireframe,
-            page_shift,
-            filtered: device.filters_heights && page_shift == 0,
-            requirements: PipelineRequirements::default(),
-            draws: PipelineRequirements::default().draws,
-            detail: look.detail,
-            measured: true,
-            windowed: false,
-            stored,
-            overlay: None,
-            maps: None,
-            drape: look.drape_over(field),
-            ground: None,
-            forced: look.forced,
-        };
-        plan.force();
-        if look.colour.shows_ground() {
-            plan.ground = Some(VirtualGroundLayout::new(field, look.texture_bytes, device.image_layers)?);
-        }
-        let layers = plan.pages()[0] * plan.pages()[1];
-        if layers > device.image_layers {
-            return Err(format!(
-                "{} x {} samples need {layers} pages of {}²: maxImageArrayLayers is {}",
-                stored[0],
-                stored[1],
-                plan.page_size()[0],
-                device.image_layers
-            ));
-        }
-        Ok(plan)
-    }
-
-    /// The plan for a technique whose lists ask for this.
-    pub fn with_requirements(self, requirements: PipelineRequirements) -> Self {
-        let mut plan = Self { requirements, draws: requirements.draws, ..self };
+    /// The plan of the same scene for another technique.
+    pub fn with_requirements(&self, requirements: PipelineRequirements) -> Self {
+        let mut plan = Self { requirements, draws: requirements.draws, ..self.clone() };
         plan.force();
         plan
+    }
+
+    fn check_layers(&self, limits: &DeviceLimits) -> Result<(), String> {
+        let layers = self.pages()[0] * self.pages()[1];
+        if layers <= limits.image_layers {
+            return Ok(());
+        }
+        let ([x, z], [side, _]) = (self.stored, self.page_size());
+        let available = limits.image_layers;
+        Err(format!("{x} x {z} samples need {layers} pages of {side}²: maxImageArrayLayers is {available}"))
     }
 
     fn force(&mut self) {
@@ -177,25 +147,28 @@ impl ScenePlan {
         }
     }
 
-    /// The plan with a picture of so many texels laid over the field: in parts where it exceeds the look's bytes or one
-    /// image, and the field has samples.
-    ///
-    /// # Errors
-    /// If the bytes do not hold the few parts that there must be.
-    pub fn with_overlay(
-        mut self,
-        field: &Field,
-        look: &Look,
-        device: &DeviceLimits,
-        overlay: Option<[u32; 2]>,
-    ) -> Result<Self, String> {
-        self.overlay = overlay;
-        let is_whole = |size: &[u32; 2]| look.holds(*size) && size.iter().all(|&n| n <= device.image_side);
-        if let Some(size) = overlay.filter(|size| field.procedural().is_none() && !is_whole(size)) {
-            self.maps =
-                Some(VirtualTextureLayout::new(size, self.drape.repeats(), look.texture_bytes, device.image_layers)?);
+    /// The specialization constants of the scene's shaders.
+    pub fn constants(&self) -> SceneConstants {
+        let [map_columns, map_rows] = self.maps.map_or([0.0; 2], |layout| layout.extent.map(|pages| pages as f32));
+        SceneConstants {
+            coded: self.coded,
+            tiled: self.tiled,
+            page_shift: self.page_shift,
+            holes: self.holes,
+            fog: self.fog,
+            colour: self.colour,
+            filtered: self.filtered,
+            morph: self.requirements.morph != Morph::No,
+            skirts: self.requirements.seams == Seams::Skirts,
+            detail: self.detail,
+            distance: self.requirements.morph == Morph::ByDistance,
+            masked: self.stored.iter().all(|n| n.is_power_of_two()),
+            ceiling: self.ceiling,
+            map_shift: self.ground.map_or(0, |layout| 32 - layout.root_shift),
+            map_columns,
+            map_rows,
+            overlay_ends: self.drape.ends,
         }
-        Ok(self)
     }
 
     /// Whether what is drawn is looked at on the host first: its triangles say which texels the ground needs.

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
+use cuesta::draw::weights::{SkirtWeights, SlotWeights};
 use cuesta::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Seams, Source,
-    Topology, skirts,
+    Topology,
 };
 use cuesta::height::Field;
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
@@ -154,7 +155,10 @@ fn smooth_tiles(field: &Arc<Field>) -> Box<dyn Technique> {
 /// Adds one step of a morph to the last sides of the tile in the middle of the list.
 fn nudge_a_side(list: &mut DrawList) {
     let middle = list.instances.len() / 2;
-    list.instances.iter_mut().skip(middle).take(1).for_each(|tile| tile.weights[2] += 0x0101_0101);
+    list.instances.iter_mut().skip(middle).take(1).for_each(|tile| {
+        let weights = SlotWeights::of(tile);
+        *tile = tile.with_weights(SlotWeights { last_sides: weights.last_sides + 0x0101_0101, ..weights });
+    });
 }
 
 fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
@@ -163,15 +167,18 @@ fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> 
 
 fn each_depth(list: &mut DrawList, factor: f32) {
     for instance in &mut list.instances {
-        let [_, sides, depth, _] = instance.weights;
-        skirts::set(&mut instance.weights, sides, factor * f32::from_bits(depth));
+        let weights = SkirtWeights::of(instance);
+        *instance = instance.with_weights(SkirtWeights { depth_m: factor * weights.depth_m, ..weights });
     }
 }
 
 /// Removes the bit of the first skirt in a list.
 fn drop_a_skirt(list: &mut DrawList) {
-    let skirted = list.instances.iter_mut().find(|instance| instance.weights[1] != 0);
-    skirted.into_iter().for_each(|instance| instance.weights[1] &= instance.weights[1] - 1);
+    let skirted = list.instances.iter_mut().find(|instance| SkirtWeights::of(instance).sides != 0);
+    skirted.into_iter().for_each(|instance| {
+        let weights = SkirtWeights::of(instance);
+        *instance = instance.with_weights(SkirtWeights { sides: weights.sides & (weights.sides - 1), ..weights });
+    });
 }
 
 impl Technique for Changed {

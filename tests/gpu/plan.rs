@@ -21,7 +21,7 @@ fn forced_features_show_the_same_picture() {
         let render = |field: &Arc<Field>, plan: &ScenePlan| {
             render_planned(gpu, field, plan, technique(field, "geomipmap", &["block=17"]).as_mut(), &view).picture
         };
-        let plan = ScenePlan::new(&field, &Look::default(), &gpu.device_limits()).unwrap();
+        let plan = ScenePlan::builder(&field, &Look::default(), &gpu.device_limits()).build().unwrap();
         assert!(plan.coded && !plan.holes && !plan.tiled && !plan.fog && plan.page_shift == 0 && plan.filtered);
         let lean = render(&field, &plan);
         let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
@@ -30,7 +30,7 @@ fn forced_features_show_the_same_picture() {
         // Nobody says how far.
         same(
             "morphing",
-            plan.clone().with_requirements(PipelineRequirements {
+            plan.with_requirements(PipelineRequirements {
                 morph: Morph::ByInstance,
                 ..PipelineRequirements::default()
             }),
@@ -39,7 +39,7 @@ fn forced_features_show_the_same_picture() {
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });
         let normals = Look { colour: Colour::Normal, ..Look::default() };
-        let of_normals = ScenePlan::new(&field, &normals, &gpu.device_limits()).unwrap();
+        let of_normals = ScenePlan::builder(&field, &normals, &gpu.device_limits()).build().unwrap();
         let detailed = ScenePlan { detail: true, ..of_normals.clone() };
         assert_eq!(render(&field, &detailed), render(&field, &of_normals), "detail");
         let wide = as_f32(&field);
@@ -70,8 +70,10 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
             ("clusters", &["block=8"]),
         ] {
             let mut techniques = [technique(&field, name, settings), technique(&field, name, settings)];
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
-            let plan = plan.with_requirements(techniques[0].pipeline_requirements());
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits())
+                .requirements(techniques[0].pipeline_requirements())
+                .build()
+                .unwrap();
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let (lean, savings) = savings::measure(&scene, &mut techniques, &view, 1).unwrap();
             assert!(lean.bytes > 0 && lean.pipelines > 1 && lean.instructions > 100, "{name}: {lean:?}");
@@ -116,7 +118,7 @@ fn what_is_left_out_by_hand_is_not_there() {
         let [plain, foggy, without] = [(0.0, Forced::default()), (3e-4, Forced::default()), (3e-4, forced)]
             .map(|(fog, forced)| Look { fog, forced, ..Look::default() })
             .map(|look| {
-                let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+                let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
                 let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
                 scene.render(technique(&field, "geomipmap", &["block=17"]).as_mut(), &view, 1).unwrap().picture
             });
@@ -140,7 +142,7 @@ fn fog_and_colours_are_seen() {
                 Look { sun_speed: 30.0, ..Look::default() }.after(4.0),
             ]);
         for look in looks {
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
             let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
             pictures.push((look, scene.render(geomipmap.as_mut(), &view, 1).unwrap().picture));
@@ -157,8 +159,9 @@ fn fog_and_colours_are_seen() {
 fn a_field_beyond_one_image_is_paged_and_one_beyond_all_is_refused_by_name() {
     let field = mountains();
     let device = DeviceLimits { image_side: 64, image_layers: 6, filters_heights: true };
-    let plan = ScenePlan::new(&field, &Look::default(), &device).unwrap();
+    let plan = ScenePlan::builder(&field, &Look::default(), &device).build().unwrap();
     assert_eq!((plan.page_size(), plan.pages(), plan.filtered), ([64, 64], [3, 2], false));
-    let refused = ScenePlan::new(&field, &Look::default(), &DeviceLimits { image_layers: 5, ..device }).unwrap_err();
+    let refused =
+        ScenePlan::builder(&field, &Look::default(), &DeviceLimits { image_layers: 5, ..device }).build().unwrap_err();
     assert!(refused.contains("maxImageArrayLayers is 5"), "{refused}");
 }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use cuesta::bench::paths;
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology, weights};
+use cuesta::draw::weights::SlotWeights;
+use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology};
 use cuesta::height::bounds::{Bounds, Measure};
 use cuesta::height::progress::Progress;
 use cuesta::height::synth::{Kind, synth};
@@ -205,9 +206,9 @@ fn no_morph_weights_exceed_the_error() {
                     cells: 32,
                     level: level - 1,
                     shift: level as i32 - 2,
-                    weights: weights::uniform(inside, sides),
                     ..Instance::default()
                 };
+                let instance = instance.with_weights(SlotWeights::uniform(inside, sides));
                 let indices = mesh.ranges[0].clone();
                 let draws = vec![Draw {
                     source: Source::Lattice,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::weights::{self, ONE};
+use cuesta::draw::weights::{ONE, SlotWeights};
 use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use cuesta::height::{Field, synth};
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
@@ -35,8 +35,8 @@ fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph:
     let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
     let rotation = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
     let weight = |w: f32| (w * ONE as f32) as u32;
-    let weights = weights::uniform(weight(morph), edge_morph.map(weight));
-    let instance = Instance { origin, cells: 16, rotation, level, weights, ..Instance::default() };
+    let weights = SlotWeights::uniform(weight(morph), edge_morph.map(weight));
+    let instance = Instance { origin, cells: 16, rotation, level, ..Instance::default() }.with_weights(weights);
     let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
     let draws = ranges.map(|indices| Draw {
         source: Source::Lattice,

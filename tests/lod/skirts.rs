@@ -3,7 +3,7 @@
 use cuesta::draw::layout::Frame;
 use cuesta::draw::place::placed;
 use cuesta::draw::skirts::{self, SKIRT};
-use cuesta::draw::weights::{self, FINER, ONE};
+use cuesta::draw::weights::{FINER, ONE, SkirtWeights};
 use cuesta::draw::{Instance, Seams};
 use cuesta::height::surface::{Corner, doubled_area};
 use cuesta::height::{Field, Holes, Samples, rtin};
@@ -62,15 +62,14 @@ fn vertices_follow_their_quadrants_alpha() {
         // The quadrants after rotation, and the morph weight of each towards the next coarser level.
         let state = cuesta::lod::clusters::states::rotated(states[k], rotation);
         let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * rotation) % ONE);
-        let mut weights = [0; 4];
-        for quadrant in 0..4 {
+        let inside = [0, 1, 2, 3].map(|quadrant: usize| {
             let finer = if state[quadrant] == 2 { FINER } else { 0 };
-            weights::set(&mut weights, weights::inside(quadrant), gone[quadrant] | finer);
-        }
-        skirts::set(&mut weights, 0x9c35, 2.5);
+            (gone[quadrant] | finer) as u8
+        });
+        let weights = SkirtWeights { inside: u32::from_le_bytes(inside), sides: 0x9c35, depth_m: 2.5 };
         let cells = skirts::cells(2 * n as u32);
-        let instance =
-            Instance { origin: [32, 0], cells, shift: 0, rotation, level: 1, weights, ..Instance::default() };
+        let instance = Instance { origin: [32, 0], cells, rotation, level: 1, ..Instance::default() };
+        let instance = instance.with_weights(weights);
         for &index in &mesh.geometry.indices[mesh.ranges[k].start as usize..mesh.ranges[k].end as usize] {
             let position = mesh.geometry.lattice[index as usize].position;
             let found = placed(&field, &frame, &instance, position);

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use cuesta::bench::paths;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::weights::{ONE, get, inside};
+use cuesta::draw::weights::{ONE, Slot, SlotWeights};
 use cuesta::draw::{DrawList, expand};
 use cuesta::height::{Field, Holes, Samples, synth};
 use cuesta::lod::Technique;
@@ -95,7 +95,7 @@ impl Counters {
     fn count(&self, list: &DrawList) {
         self.frames.fetch_add(1, Relaxed);
         let is_between = |weight: u32| weight > 0 && weight < ONE;
-        let morphing = list.instances.iter().any(|tile| is_between(get(tile, inside(0))));
+        let morphing = list.instances.iter().any(|tile| is_between(SlotWeights::of(tile).get(Slot::inside(0))));
         self.morphing.fetch_add(u64::from(morphing), Relaxed);
         self.pending.fetch_add(u64::from(list.pending > 0), Relaxed);
         self.stitched.fetch_add(u64::from(list.levels().iter().filter(|&&n| n > 0).count() > 1), Relaxed);

@@ -5,7 +5,8 @@ use super::refine::{Found, Refinement, Split};
 use super::skirts::Skirts;
 use super::states::{Seeds, State};
 use super::tree::{Node, SIDES};
-use crate::draw::weights::{self, FINER, ONE, STITCHED};
+use crate::draw::layout::{FIRST_SIDE, LAST_SIDE, SEAM};
+use crate::draw::weights::{FINER, ONE, STITCHED, Slot, SlotWeights};
 use crate::draw::{self, Instance};
 
 /// Contents of a quadrant of a cluster.
@@ -74,12 +75,11 @@ impl Collapse<'_> {
         let instance = match &self.skirts {
             Some(skirts) => Instance { rotation, ..self.skirted(skirts, node, level, blocks(node, state)) },
             None => {
-                let weights = if self.evaluator.is_by_distance() {
-                    self.evaluator.ranges.weights(level, 0, finer(state))
-                } else {
-                    self.weights(split, state)
-                };
-                Instance { rotation, cells: 4 * self.cells, weights, ..self.placed(node, level) }
+                let instance = Instance { rotation, cells: 4 * self.cells, ..self.placed(node, level) };
+                match self.evaluator.is_by_distance() {
+                    true => instance.with_weights(self.evaluator.ranges.weights(level, 0, finer(state))),
+                    false => instance.with_weights(self.weights(split, state)),
+                }
             }
         };
         drawn.push((seed as u32, instance));
@@ -90,9 +90,11 @@ impl Collapse<'_> {
         match &self.skirts {
             Some(skirts) => self.skirted(skirts, root, root.level, std::iter::once((0, root))),
             None => {
-                let is_by_distance = self.evaluator.is_by_distance();
-                let weights = if is_by_distance { self.evaluator.ranges.weights(root.level, 0, 0) } else { [0; 4] };
-                Instance { cells: 2 * self.cells, weights, ..self.placed(root, root.level) }
+                let instance = Instance { cells: 2 * self.cells, ..self.placed(root, root.level) };
+                match self.evaluator.is_by_distance() {
+                    true => instance.with_weights(self.evaluator.ranges.weights(root.level, 0, 0)),
+                    false => instance,
+                }
             }
         }
     }
@@ -107,20 +109,19 @@ impl Collapse<'_> {
         let side = |side: usize| {
             if is_sibling(side) { inside } else { self.refinement.side_weight(self.evaluator, split, side) }
         };
-        let weights = if self.evaluator.is_by_distance() {
+        let instance = Instance { cells: 2 * self.cells, ..self.placed(node, node.level) };
+        if self.evaluator.is_by_distance() {
             let staying = SIDES.map(|side| u32::from(is_sibling(side)) << side).iter().sum();
-            self.evaluator.ranges.weights(node.level, staying, 0)
-        } else {
-            weights::uniform(inside, SIDES.map(side))
-        };
-        Instance { cells: 2 * self.cells, weights, ..self.placed(node, node.level) }
+            return instance.with_weights(self.evaluator.ranges.weights(node.level, staying, 0));
+        }
+        instance.with_weights(SlotWeights::uniform(inside, SIDES.map(side)))
     }
 
     /// Returns the instance of blocks at a node, each in a quadrant, with their skirts. Only quadrants have weights: a
     /// quadrant of one block of weight v is the paper's α = ½ (1 − v), one of four is α = ½ + ½ (1 − v).
     fn skirted(&self, skirts: &Skirts, node: Node, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> Instance {
         let cells = draw::skirts::cells(2 * self.cells);
-        Instance { cells, weights: skirts.weights(level, blocks), ..self.placed(node, level) }
+        Instance { cells, ..self.placed(node, level) }.with_weights(skirts.weights(level, blocks))
     }
 
     /// Returns an instance at a node's first vertex, with two mesh units per cell of a level.
@@ -132,14 +133,14 @@ impl Collapse<'_> {
 
     /// Returns the weights of a cluster in a node. Blocks morph into their parent: for a single one the cluster's node,
     /// for four their quadrant.
-    fn weights(&self, split: &Split, state: State) -> [u32; 4] {
-        let mut weights = [0; 4];
+    fn weights(&self, split: &Split, state: State) -> SlotWeights {
+        let mut weights = SlotWeights::default();
         // Sides that two quadrants share are computed once.
         let mut sides = [None; 4];
         for quadrant in (0..4).filter(|&quadrant| state[quadrant as usize] != NOTHING) {
             let fine = self.four_blocks(split, state, quadrant);
             let inside = fine.unwrap_or(split).weight(self.evaluator) | if fine.is_some() { FINER } else { 0 };
-            weights::set(&mut weights, weights::inside(quadrant as usize), inside);
+            weights.set(Slot::inside(quadrant), inside);
             for (slot, side) in outer_sides(quadrant) {
                 let weight = match fine {
                     Some(fine) => self.refinement.side_weight(self.evaluator, fine, side),
@@ -147,11 +148,11 @@ impl Collapse<'_> {
                         *sides[side].get_or_insert_with(|| self.refinement.side_weight(self.evaluator, split, side))
                     }
                 };
-                weights::set(&mut weights, slot, weight);
+                weights.set(slot, weight);
             }
         }
         for (byte, quadrants, side) in SEAMS {
-            weights::set(&mut weights, (3, byte), self.seam_weight(split, state, quadrants, side));
+            weights.set(Slot { line: SEAM, byte }, self.seam_weight(split, state, quadrants, side));
         }
         weights
     }
@@ -188,7 +189,8 @@ fn finer(state: State) -> u32 {
 }
 
 /// Returns the halves of outer sides that belong to a quadrant, as slot and side.
-fn outer_sides(quadrant: u32) -> [(weights::Slot, usize); 2] {
+fn outer_sides(quadrant: u32) -> [(Slot, usize); 2] {
     let [right, lower] = [quadrant & 1, quadrant >> 1];
-    [((1 + right as usize, lower), 2 * right as usize), ((1 + lower as usize, 2 + right), 1 + 2 * lower as usize)]
+    let slot = |is_last: u32, byte: u32| Slot { line: if is_last == 0 { FIRST_SIDE } else { LAST_SIDE }, byte };
+    [(slot(right, lower), 2 * right as usize), (slot(lower, 2 + right), 1 + 2 * lower as usize)]
 }

@@ -8,13 +8,13 @@
 //!
 //! If there are more split nodes than the table holds, a flag is set and the root is drawn as one block.
 
+use super::layout::{ClusterScratch, ClusterTree, ClusterView};
 use super::mesh::Mesh;
 use super::morph_ranges::MORPH_RANGES;
 use super::states::Seeds;
 use super::tree::{Errors, Tree};
 use crate::draw::Seams;
 use crate::draw::gpu_selection::{GpuSelection, Groups, Step};
-use crate::draw::layout::{ClusterScratch, ClusterTree, ClusterView};
 
 const PROGRAMS: &[&str] = &[
     "cluster_refine.comp",

@@ -17,11 +17,11 @@
 
 use glam::Vec4;
 
+use super::layout::{CERTIFIED, ClusterView, DISTANCE, EVEN, PAPER};
 use super::morph_ranges::{MorphRanges, NODE_END};
 use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
-use crate::draw::layout::ClusterView;
-use crate::draw::place::RenderOrigin;
+use crate::draw::layout::RenderOrigin;
 use crate::height::bounds::Square;
 use crate::view::{Containment, Lens, Metric, View};
 
@@ -39,12 +39,6 @@ const MIN: f32 = 1e-18;
 const MIN_ERROR: f32 = 1e-12;
 /// Error margin of a node without error.
 pub const WITHOUT_ERROR: f32 = 1e30;
-
-/// Values of [`ClusterView::metric`].
-const CERTIFIED: u32 = 0;
-const PAPER: u32 = 1;
-const EVEN: u32 = 2;
-const DISTANCE: u32 = 3;
 
 /// Evaluates nodes of a quadtree for one view.
 pub struct LodEvaluator<'a> {
@@ -164,14 +158,14 @@ impl<'a> LodEvaluator<'a> {
     /// Returns the position of a sample relative to the eye along x or z, metres.
     #[inline]
     fn metres(&self, at: u32, axis: usize) -> f32 {
-        let metres = (at as i32 - self.view.render_origin[axis]) as f32 * self.view.spacing[axis];
-        (metres + self.view.render_origin_relative[axis]).clamp(-FARTHEST, FARTHEST)
+        let metres = (at as i32 - self.view.origin.at[axis]) as f32 * self.view.spacing[axis];
+        (metres + self.view.origin.relative[axis]).clamp(-FARTHEST, FARTHEST)
     }
 
     /// Returns heights relative to the eye, metres.
     #[inline]
     fn above(&self, heights: Vec4) -> Vec4 {
-        let above = (heights - self.view.render_origin_height) + self.view.render_origin_height_relative;
+        let above = (heights - self.view.origin.height) + self.view.origin.height_relative;
         above.max(Vec4::splat(-FARTHEST)).min(Vec4::splat(FARTHEST))
     }
 
@@ -276,7 +270,7 @@ fn single(value: f64) -> f32 {
 }
 
 fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> ClusterView {
-    let render_origin = RenderOrigin::new(tree.origin, tree.spacing, view.eye);
+    let origin = RenderOrigin::new(tree.origin, tree.spacing, view.eye);
     let planes = view.planes().map(|(normal, distance)| {
         let [x, y, z] = normal.to_array().map(single);
         [x, y, z, single(distance)]
@@ -293,10 +287,12 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
     let scale_for = |px: f64| single(scale * view.focal_px() / px);
     let corner = view.corner_ray();
     ClusterView {
-        render_origin: render_origin.at,
-        render_origin_relative: render_origin.relative.map(|metres| single(metres.into())),
-        render_origin_height: single(render_origin.height.into()),
-        render_origin_height_relative: single(render_origin.height_relative.into()),
+        origin: RenderOrigin {
+            at: origin.at,
+            relative: origin.relative.map(|metres| single(metres.into())),
+            height: single(origin.height.into()),
+            height_relative: single(origin.height_relative.into()),
+        },
         spacing: tree.spacing.map(single),
         near_plane: planes[0],
         right_plane: planes[1],

@@ -28,6 +28,7 @@
 
 mod collapse;
 mod gpu_selection;
+pub mod layout;
 mod lod_evaluator;
 pub mod mesh;
 mod morph_ranges;
@@ -45,7 +46,9 @@ use self::refine::Refinement;
 use self::skirts::Skirts;
 use self::states::{MAX_SEEDS, Seeds};
 use self::tree::Tree;
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
+use super::{
+    Diagnostics, Entry, Need, SelectOnGpu, Setting, Settings, Technique, Values, Variant, select_within_limits,
+};
 use crate::draw::{
     Draw, DrawList, Geometry, GpuSelection, Instance, Limits, Morph, PipelineRequirements, Seams, Source, Submission,
     Topology,
@@ -259,16 +262,6 @@ impl Technique for Clusters {
         }
     }
 
-    fn gpu_selection(&self) -> Option<&GpuSelection> {
-        self.gpu_selection.as_ref()
-    }
-
-    fn parameters(&self, view: &View, words: &mut Vec<u32>) {
-        let evaluator = evaluator(&self.tree, self.morph, view);
-        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&evaluator.view)));
-        words.extend(evaluator.ranges.ranges.map(f32::to_bits));
-    }
-
     fn keeps_tolerance(&self) -> bool {
         self.measured
     }
@@ -282,6 +275,28 @@ impl Technique for Clusters {
         PipelineRequirements { morph, seams: self.seams, ..PipelineRequirements::default() }
     }
 
+    fn on_gpu(&self) -> Option<&dyn SelectOnGpu> {
+        self.gpu_selection.is_some().then_some(self as _)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl SelectOnGpu for Clusters {
+    fn selection(&self) -> &GpuSelection {
+        self.gpu_selection.as_ref().expect("only techniques with a selection say so")
+    }
+
+    fn parameters(&self, view: &View, words: &mut Vec<u32>) {
+        let evaluator = evaluator(&self.tree, self.morph, view);
+        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&evaluator.view)));
+        words.extend(evaluator.ranges.ranges.map(f32::to_bits));
+    }
+}
+
+impl Diagnostics for Clusters {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("kinds of clusters", self.mesh.ranges.len() as f64, ""),

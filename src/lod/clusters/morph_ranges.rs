@@ -8,7 +8,8 @@
 //! begun.
 
 use super::tree::Tree;
-use crate::draw::distance::{END, weights};
+use crate::draw::distance::{MORPH_END, weights};
+use crate::draw::weights::DistanceWeights;
 use crate::height::bounds::{Bounds, ROUNDING};
 use crate::height::{Field, level_errors};
 use crate::view::{Lens, Metric, View};
@@ -21,7 +22,7 @@ pub const MORPH_RANGES: usize = 32;
 
 /// Squared distance at which a morph has ended for all of a node, relative to that of its beginning; rounding cannot
 /// matter.
-pub const NODE_END: f32 = END * 1.0001;
+pub const NODE_END: f32 = MORPH_END * 1.0001;
 
 /// Maximum distance, metres.
 const FARTHEST_M: f64 = 1e12;
@@ -67,13 +68,13 @@ impl MorphRanges {
             let allowed_m = allowed_from_m(view, tree.error(level, 0.0).into());
             let begin_m = GUARD * (allowed_m + cell_m).max(ended_m).min(FARTHEST_M);
             ranges[level as usize] = (1.0 / (begin_m * begin_m)) as f32;
-            ended_m = GUARD * f64::from(END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
+            ended_m = GUARD * f64::from(MORPH_END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
         }
         Self { ranges, above_squared: (above * above) as f32 }
     }
 
     /// Returns the weights of an instance of a level.
-    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> [u32; 4] {
+    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> DistanceWeights {
         // The root has no level to morph into.
         let into = |level: u32| self.ranges.get(level as usize).copied().unwrap_or(0.0);
         weights(staying, finer, [into(level + 1), into(level)], self.above_squared)

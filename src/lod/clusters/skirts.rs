@@ -14,8 +14,7 @@
 use super::lod_evaluator::LodEvaluator;
 use super::refine::Refinement;
 use super::tree::{Node, SIDES};
-use crate::draw::skirts;
-use crate::draw::weights::{self, FINER, ONE};
+use crate::draw::weights::{FINER, ONE, SkirtWeights};
 
 /// Maximum visible gap between coinciding edges after rasterisation, pixels: vertices are rounded to 1/256 of a pixel,
 /// and a skirt may be seen from almost above.
@@ -47,21 +46,18 @@ impl<'a> Skirts<'a> {
 
     /// Returns the weights of an instance of a level that draws these blocks, each in a quadrant. Words 1 and 2
     /// describe its skirts.
-    pub fn weights(&self, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> [u32; 4] {
-        let (mut inside, mut sides, mut depth) = ([0; 4], 0, 0.0f32);
+    pub fn weights(&self, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> SkirtWeights {
+        let (mut inside, mut sides, mut depth_m) = ([0; 4], 0, 0.0f32);
         for (quadrant, block) in blocks {
             let finer = if block.level < level { FINER } else { 0 };
-            inside[quadrant as usize] = self.edge(block).weight | finer;
+            inside[quadrant as usize] = (self.edge(block).weight | finer) as u8;
             for side in SIDES {
                 let Some(gap) = self.gap_m(block, side) else { continue };
                 sides |= 1 << (4 * quadrant + side as u32);
-                depth = depth.max(gap);
+                depth_m = depth_m.max(gap);
             }
         }
-        let mut weights = [0; 4];
-        (0..4).for_each(|quadrant| weights::set(&mut weights, weights::inside(quadrant), inside[quadrant]));
-        skirts::set(&mut weights, sides, depth);
-        weights
+        SkirtWeights { inside: u32::from_le_bytes(inside), sides, depth_m }
     }
 
     /// Returns the maximum gap between a block and the surface beyond a side, metres; `None` if the edges are the same.

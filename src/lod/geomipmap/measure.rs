@@ -15,7 +15,7 @@ use super::mesh;
 use crate::draw::Instance;
 use crate::draw::layout::Frame;
 use crate::draw::place::{lattice_height, lattice_position, turned_position};
-use crate::draw::weights::{self, ONE};
+use crate::draw::weights::{ONE, SlotWeights};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle};
 
@@ -75,18 +75,18 @@ impl<'a> Block<'a> {
     /// Creates the block at a place among the blocks.
     pub fn new(field: &'a Field, cells: i32, at: [i32; 2]) -> Self {
         let last = field.size().map(|n| n as i32 - 1);
-        Self { field, frame: Frame { last, ..Frame::default() }, cells, at }
+        Self { field, frame: Frame::of_lattice(last), cells, at }
     }
 
     /// Returns the first and the last sample.
     fn ends(&self) -> [[i32; 2]; 2] {
         let first = self.at.map(|n| n * self.cells);
-        [first, [0, 1].map(|k| (first[k] + self.cells).min(self.frame.last[k]))]
+        [first, [0, 1].map(|k| (first[k] + self.cells).min(self.frame.heights.last[k]))]
     }
 
     /// Returns true if the block extends beyond the field.
     fn is_partial(&self) -> bool {
-        (0..2).any(|k| (self.at[k] + 1) * self.cells > self.frame.last[k])
+        (0..2).any(|k| (self.at[k] + 1) * self.cells > self.frame.heights.last[k])
     }
 
     /// Returns the range of all heights, including those of holes, metres.
@@ -132,17 +132,18 @@ impl<'a> Block<'a> {
             cells: self.cells as u32,
             rotation: single_cell_rotation(self.at, self.cells >> shape.level),
             level: shape.level,
-            weights: weights::uniform(shape.morph, shape.edge_morph),
             ..Instance::default()
         };
-        shape.triangles.iter().map(|t| self.deviation(&instance, t)).fold(0.0, f32::max)
+        let weights = SlotWeights::uniform(shape.morph, shape.edge_morph);
+
+        shape.triangles.iter().map(|t| self.deviation(&instance, &weights, t)).fold(0.0, f32::max)
     }
 
-    fn deviation(&self, instance: &Instance, triangle: &[[i32; 2]; 3]) -> f32 {
+    fn deviation(&self, instance: &Instance, weights: &SlotWeights, triangle: &[[i32; 2]; 3]) -> f32 {
         let corners: Triangle = triangle.map(|at| {
             let turned = turned_position(instance, at.map(|n| n << instance.level));
             let [x, z] = lattice_position(&self.frame, instance, turned);
-            Corner { x, z, y: lattice_height(self.field, &self.frame, instance, turned) }
+            Corner { x, z, y: lattice_height(self.field, &self.frame, instance, weights, turned) }
         });
         if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(self.field, &corners) }
     }

@@ -28,9 +28,10 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
+use super::{Diagnostics, Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{
-    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology, weights,
+    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -157,7 +158,7 @@ impl GeoMipMap {
     /// level of its two blocks; the other block is at most one level finer, so its error bound covers it. The inside of
     /// a block that extends beyond the field does not morph, nor does a side between two such blocks, because midpoints
     /// are not vertices there.
-    fn weights(&self, block: usize) -> [u32; 4] {
+    fn weights(&self, block: usize) -> SlotWeights {
         let base = self.level(block) * ONE;
         let partial = |block| self.blocks.is_partial(block);
         let weight = |level: u32, stays: bool| {
@@ -165,7 +166,7 @@ impl GeoMipMap {
             (level - base) / (ONE / weights::ONE)
         };
         let edge = |other: usize| weight(self.levels[block].max(self.levels[other]), partial(block) && partial(other));
-        weights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
+        SlotWeights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
     }
 
     fn instance(&self, block: usize) -> Instance {
@@ -173,15 +174,14 @@ impl GeoMipMap {
         let level = self.level(block);
         let (_, rotation) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
-        Instance {
+        let instance = Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
-            shift: 0,
             rotation: rotation.max(measure::single_cell_rotation(at, self.blocks.cells >> level)),
             level,
-            batch: 0,
-            weights: if self.morph { self.weights(block) } else { [0; 4] },
-        }
+            ..Instance::default()
+        };
+        if self.morph { instance.with_weights(self.weights(block)) } else { instance }
     }
 
     /// Sorts the visible blocks into runs of the same level and border and appends their instances.
@@ -278,6 +278,12 @@ impl Technique for GeoMipMap {
         }
     }
 
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Diagnostics for GeoMipMap {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             let mesh = BlockMesh::used(self.blocks.cells, self.masks, finest, alone);

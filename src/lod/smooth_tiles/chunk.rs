@@ -9,7 +9,8 @@
 use glam::Vec3;
 
 use super::pattern;
-use crate::draw::weights::{self, Slot};
+use crate::draw::layout::{FIRST_SIDE, LAST_SIDE};
+use crate::draw::weights::Slot;
 use crate::draw::{ExplicitVertex, VertexNormals, normals};
 use crate::height::Field;
 
@@ -38,7 +39,7 @@ pub fn vertices(cells: i32, level: u32) -> usize {
 
 /// Returns the slot of a side's weight. Both halves of a side have the same weight; this is the first one's.
 fn side_slot(side: usize) -> Slot {
-    (1 + side / 2, 2 * (side as u32 % 2))
+    Slot { line: if side < 2 { FIRST_SIDE } else { LAST_SIDE }, byte: 2 * (side as u32 % 2) }
 }
 
 /// Builds the vertices of a tile at a level, row by row.
@@ -107,14 +108,14 @@ impl ChunkLevel<'_> {
     fn regions(&self, at: [i32; 2]) -> u32 {
         if let Some(side) = pattern::side(self.n, at) {
             let is_odd = at[1 - side % 2] & 1 == 1;
-            return weights::region(side_slot(side), u32::from(!is_odd));
+            return side_slot(side).region(u32::from(!is_odd));
         }
         if !self.moves_inside(at) {
             return 0;
         }
         let side = ends(at, self.half_edge(at)).into_iter().find_map(|end| pattern::side(self.n, end));
-        let second = side.map_or(0, |side| weights::region(side_slot(side), 1));
-        weights::region(weights::inside(0), 0) | second << 8
+        let second = side.map_or(0, |side| side_slot(side).region(1));
+        Slot::inside(0).region(0) | second << 8
     }
 
     /// Returns true if a vertex lies inside and the next level lacks it.
@@ -183,7 +184,7 @@ mod tests {
     use crate::draw::Instance;
     use crate::draw::normals::explicit_normal;
     use crate::draw::place::explicit_height;
-    use crate::draw::weights::ONE;
+    use crate::draw::weights::{ONE, SlotWeights};
     use crate::height::{Holes, Samples};
 
     const CELLS: i32 = 16;
@@ -203,7 +204,7 @@ mod tests {
         fn new(field: &Field, origin: [i32; 2], level: u32, inside: u32, sides: [u32; 4]) -> Self {
             let chunk = build(field, Place { origin, cells: CELLS }, level);
             assert_eq!(chunk.len(), vertices(CELLS, level));
-            let instance = Instance { weights: weights::uniform(inside, sides), ..Instance::default() };
+            let instance = Instance::default().with_weights(SlotWeights::uniform(inside, sides));
             Self { n: CELLS >> level, heights: chunk.iter().map(|vertex| explicit_height(&instance, vertex)).collect() }
         }
 
@@ -256,7 +257,7 @@ mod tests {
                 field.normal((origin[0] + x * step) as u32, (origin[1] + z * step) as u32)
             };
             let drawn = |at: [i32; 2], weight: u32| {
-                let instance = Instance { weights: weights::uniform(weight, [weight; 4]), ..Instance::default() };
+                let instance = Instance::default().with_weights(SlotWeights::uniform(weight, [weight; 4]));
                 let k = (at[1] * (n + 1) + at[0]) as usize;
                 explicit_normal(&instance, &vertices[k], &normals[k])
             };

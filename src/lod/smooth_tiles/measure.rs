@@ -8,7 +8,7 @@
 use super::chunk::{self, Place};
 use super::pattern::{self, Triangle};
 use crate::draw::place::explicit_height;
-use crate::draw::weights::{self, ONE};
+use crate::draw::weights::{ONE, SlotWeights};
 use crate::draw::{ExplicitVertex, Instance};
 use crate::height::Field;
 use crate::height::surface::{self, Corner};
@@ -106,7 +106,7 @@ impl<'a> Tile<'a> {
     /// Returns the largest distance of triangles from the samples, metres, at these morph weights of the inside and of
     /// all sides.
     fn error(&self, chunk: &[ExplicitVertex], n: i32, [inside, side]: [u32; 2], triangles: &[Triangle]) -> f32 {
-        let instance = Instance { weights: weights::uniform(inside, [side; 4]), ..Instance::default() };
+        let instance = Instance::default().with_weights(SlotWeights::uniform(inside, [side; 4]));
         let size = self.field.size();
         let corner = |[x, z]: [i32; 2]| {
             let vertex = &chunk[(z * (n + 1) + x) as usize];

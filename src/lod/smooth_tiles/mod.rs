@@ -43,10 +43,11 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
+use super::{Diagnostics, Entry, Gradual, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
-    Topology, Upload, VertexNormals, weights,
+    Topology, Upload, VertexNormals,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -282,7 +283,7 @@ impl SmoothTiles {
         let place = self.tiles.place(tile);
         let (mask, weights) = self.border(tile);
         let (origin, cells) = (place.origin, place.cells as u32);
-        list.instances.push(Instance { origin, cells, level, batch, weights, ..Instance::default() });
+        list.instances.push(Instance { origin, cells, level, batch, ..Instance::default() }.with_weights(weights));
         let border = self.patterns.border(level, mask, self.tiles.is_odd(tile));
         for indices in [self.patterns.centres[level as usize].clone(), border] {
             if !indices.is_empty() {
@@ -295,7 +296,7 @@ impl SmoothTiles {
 
     /// Returns the set of sides that meet coarser tiles (bit q: side q), and the morph weights of the inside and the
     /// sides.
-    fn border(&self, tile: usize) -> (usize, [u32; 4]) {
+    fn border(&self, tile: usize) -> (usize, SlotWeights) {
         let base = self.queue.levels[tile];
         let is_partial = self.tiles.is_partial(tile);
         let weight = |level: u32| (level - base * ONE) / (ONE / weights::ONE);
@@ -310,7 +311,7 @@ impl SmoothTiles {
             sides[side] = weight(if stays { coarser * ONE } else { self.levels[tile].max(self.levels[other]) });
         }
         let inside = if is_partial { 0 } else { weight(self.levels[tile]) };
-        (mask, weights::uniform(inside, sides))
+        (mask, SlotWeights::uniform(inside, sides))
     }
 }
 
@@ -339,16 +340,6 @@ impl Technique for SmoothTiles {
         self.visible.iter().for_each(|&tile| self.push(tile, list));
     }
 
-    fn is_settled(&self) -> bool {
-        // The viewer's movement is zero when the view does not change.
-        let is_still = self.clock.drive() == Drive::Speed;
-        let is_settled = |tile: usize| {
-            let (aim, current) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
-            self.levels[tile] == ONE * aim.clamp(current, current + 1)
-        };
-        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(is_settled))
-    }
-
     fn keeps_tolerance(&self) -> bool {
         true
     }
@@ -358,6 +349,28 @@ impl Technique for SmoothTiles {
         PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Gradual for SmoothTiles {
+    fn is_settled(&self) -> bool {
+        // The viewer's way is over where the view stays the same.
+        let is_still = self.clock.drive() == Drive::Speed;
+        let stands = |tile: usize| {
+            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
+            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
+        };
+        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
+    }
+}
+
+impl Diagnostics for SmoothTiles {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             size_of_val(Patterns::new(self.tiles.cells, finest, alone).indices.as_slice()) as u64

@@ -33,7 +33,7 @@ use crate::draw::{
 };
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::lod::{Settings, Technique, select_within_limits};
+use crate::lod::{Diagnostics, Settings, Technique, select_within_limits};
 use crate::view::{Containment, Lens, View};
 
 /// Sorted strips over a floor and a ceiling.
@@ -201,6 +201,12 @@ impl Technique for CaveStrips {
         true
     }
 
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Diagnostics for CaveStrips {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let open = self.is_open.iter().filter(|is_open| **is_open).count();
         let bytes = self.errors.iter().map(Errors::bytes).sum::<usize>();

@@ -69,7 +69,9 @@ use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::{Radial, eye_height_m};
 use self::walk::{Stream, WalkContext, Worker};
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
+use super::{
+    Diagnostics, Entry, Need, SelectInParts, Setting, Settings, Technique, Values, Variant, select_within_limits,
+};
 use crate::draw::{
     DepthMode, Draw, DrawKinds, DrawList, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
 };
@@ -410,6 +412,28 @@ impl Technique for SortedStrips {
         self.select_in_parts(view, list, &mut |_| ());
     }
 
+    fn keeps_tolerance(&self) -> bool {
+        self.edge.is_none()
+    }
+
+    fn pipeline_requirements(&self) -> PipelineRequirements {
+        let draws = DrawKinds::explicit(self.topology);
+        // Where vertices slide the order is not that of every ray.
+        let is_in_order = !matches!(self.blend, Blend::End(_));
+        let depth_mode = if is_in_order { self.sequence.depth_mode() } else { DepthMode::Buffer };
+        PipelineRequirements { draws, depth_mode, ..PipelineRequirements::default() }
+    }
+
+    fn in_parts(&mut self) -> Option<&mut dyn SelectInParts> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl SelectInParts for SortedStrips {
     fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
         self.find_pages(view);
         list.reach_m = self.reach_m(view);
@@ -430,19 +454,9 @@ impl Technique for SortedStrips {
         self.workers = workers;
         self.triangles_before = list.triangles() as usize;
     }
+}
 
-    fn keeps_tolerance(&self) -> bool {
-        self.edge.is_none()
-    }
-
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        let draws = DrawKinds::explicit(self.topology);
-        // Vertices that slide break the order for some rays.
-        let is_in_order = !matches!(self.blend, Blend::End(_));
-        let depth_mode = if is_in_order { self.sequence.depth_mode() } else { DepthMode::Buffer };
-        PipelineRequirements { draws, depth_mode, ..PipelineRequirements::default() }
-    }
-
+impl Diagnostics for SortedStrips {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let pages = self.pages.grid.count.map(f64::from);
         vec![

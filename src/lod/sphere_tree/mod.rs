@@ -49,7 +49,7 @@ use self::patches::Patches;
 use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
 use self::splits::{Changes, Found, Splits};
-use super::{Entry, Setting, Settings, Technique, Values, select_within_limits};
+use super::{Diagnostics, Entry, Gradual, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{DrawKinds, DrawList, Geometry, Limits, Normals, PipelineRequirements};
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
@@ -230,10 +230,6 @@ impl Technique for SphereTree {
         self.sent_bytes = size.upload_bytes + patches::bytes(size.vertices, size.indices);
     }
 
-    fn is_settled(&self) -> bool {
-        !self.patches.as_ref().is_some_and(Patches::is_pending)
-    }
-
     fn keeps_tolerance(&self) -> bool {
         true
     }
@@ -243,6 +239,22 @@ impl Technique for SphereTree {
         PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Gradual for SphereTree {
+    fn is_settled(&self) -> bool {
+        !self.patches.as_ref().is_some_and(Patches::is_pending)
+    }
+}
+
+impl Diagnostics for SphereTree {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("wedges visited for the last view", 2.0 * self.criterion.visited() as f64, ""),
