@@ -112,7 +112,7 @@ impl Refinement {
             return Found::Nothing;
         }
         if error_margin >= evaluator.view.band_end || self.splits.len() > self.max {
-            return block(is_in_sight(evaluator, node, containment));
+            return block(is_in_view(evaluator, node, containment));
         }
         Found::Split(self.insert(evaluator, node, error_margin, containment))
     }
@@ -150,7 +150,7 @@ impl Refinement {
             let child = node.child(quadrant as u32);
             let found = match self.find(evaluator.tree, child) {
                 Some(place) => Found::Split(place),
-                None => block(self.is_leaf_in_sight(evaluator, child)),
+                None => block(self.is_leaf_in_view(evaluator, child)),
             };
             self.splits[k as usize].hold(quadrant, found);
         }
@@ -160,8 +160,8 @@ impl Refinement {
         }
     }
 
-    fn is_leaf_in_sight(&self, evaluator: &LodEvaluator, node: Node) -> bool {
-        evaluator.containment(node).is_some_and(|containment| is_in_sight(evaluator, node, containment))
+    fn is_leaf_in_view(&self, evaluator: &LodEvaluator, node: Node) -> bool {
+        evaluator.containment(node).is_some_and(|containment| is_in_view(evaluator, node, containment))
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
@@ -216,7 +216,7 @@ fn block(is_seen: bool) -> Found {
 
 /// Whether any of the finest blocks in a node may be seen: with the box of the whole alone a coarse block might be
 /// drawn where finer ones are not, and a wider tolerance would draw more.
-fn is_in_sight(evaluator: &LodEvaluator, node: Node, containment: Containment) -> bool {
+fn is_in_view(evaluator: &LodEvaluator, node: Node, containment: Containment) -> bool {
     match containment {
         Containment::Outside => false,
         Containment::Inside => true,
@@ -224,7 +224,7 @@ fn is_in_sight(evaluator: &LodEvaluator, node: Node, containment: Containment) -
             node.level == 0
                 || (0u32..)
                     .zip(evaluator.contained_in(node))
-                    .any(|(quadrant, containment)| is_in_sight(evaluator, node.child(quadrant), containment))
+                    .any(|(quadrant, containment)| is_in_view(evaluator, node.child(quadrant), containment))
         }
     }
 }
