@@ -1,4 +1,4 @@
-//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`); tells the commit.
+//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (feature `vulkan`), and records the commit.
 
 #[cfg(feature = "vulkan")]
 #[path = "src/draw"]
@@ -23,19 +23,19 @@ mod plan {
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    tell_commit();
+    record_commit();
     #[cfg(feature = "vulkan")]
     shaders::compile_all();
 }
 
-/// In a clone, makes the commit known to the program as `CUESTA_COMMIT`.
-fn tell_commit() {
+/// Sets `CUESTA_COMMIT` in a clone.
+fn record_commit() {
     let git = |words: &[&str]| {
         let output = std::process::Command::new("git").args(words).output().ok()?;
         let text = String::from_utf8(output.stdout).ok()?;
         output.status.success().then(|| text.trim().to_string())
     };
-    // The log of HEAD grows with every commit and checkout.
+    // The log of HEAD changes with every commit and checkout.
     if let (Some(commit), Some(log)) =
         (git(&["rev-parse", "--short=12", "HEAD"]), git(&["rev-parse", "--git-path", "logs/HEAD"]))
     {
@@ -112,7 +112,7 @@ mod shaders {
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_6);
         options.set_optimization_level(OptimizationLevel::Performance);
-        // Names of structs and members: the layout test reads them.
+        // Keeps the names of structs and members for the layout test.
         options.set_generate_debug_info();
         options.set_warnings_as_errors();
         if let Some(define) = define {

@@ -1,5 +1,5 @@
 #version 460
-// The instance of each cluster, with its weights: src/lod/clusters/collapse.rs, push_cluster.
+// Writes the instance of each cluster with its weights: src/lod/clusters/collapse.rs, push_cluster.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 #include "cluster_output.glsl"

@@ -1,8 +1,8 @@
-// How far blocks have gone over into their parents: src/lod/clusters/refine.rs, and src/draw/weights.rs.
+// Morph weights of blocks towards their parents: src/lod/clusters/refine.rs.
 
 #include "weights.glsl"
 
-// Whether a node is split, and how far the blocks in it have gone over into it: refine.rs, weight.
+// Weight with which the blocks in a node have morphed to it. False if the node is not split.
 bool weight(Node node, out uint found) {
     found = 0;
     uint place = find(node);

@@ -1,5 +1,5 @@
 #version 460
-// Vertices without heights: displaced by the height texture.
+// Vertices without heights, displaced by the height texture.
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "position.glsl"

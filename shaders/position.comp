@@ -1,12 +1,12 @@
 #version 460
-// Positions of the vertices of a draw list, for comparison with the CPU twin (src/draw/place.rs).
+// Positions of the vertices of a draw list, for comparison with the CPU reference (src/draw/place.rs).
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "position.glsl"
 
 layout(local_size_x = 64) in;
 
-// A vertex and the instance it is placed by.
+// A vertex and its instance.
 struct Query { ExplicitVertex vertex; VertexNormals normals; Instance instance; uint explicit_height; };
 
 struct Answer { vec3 position; vec3 normal; };

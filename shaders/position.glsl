@@ -2,7 +2,7 @@
 // apart, as they are there.
 #include "weights.glsl"
 
-// Layer and texel of a lattice position inside the field.
+// Texel and layer of a lattice position inside the field.
 ivec3 texel(ivec2 at) {
     if (TILED) at = MASKED ? at & (frame.heights.stored - 1) : at % frame.heights.stored;
     if (PAGE_SHIFT == 0) return ivec3(at, 0);
@@ -18,12 +18,12 @@ float decoded_height(float stored) {
     return height;
 }
 
-// The sample at a lattice position, to the bit.
+// Exact sample at a lattice position.
 float sample_height(ivec2 at) {
     return decoded_height(texelFetch(height_pages, texel(at), 0).r);
 }
 
-// The same of the field, or of the ceiling over it.
+// Exact sample of the field, or of the ceiling over it.
 float surface_height(ivec2 at, bool is_ceiling) {
     if (CEILING && is_ceiling) return decoded_height(texelFetch(ceiling_pages, texel(at), 0).r);
     return sample_height(at);
@@ -173,7 +173,7 @@ vec3 explicit_normal(Instance instance, ExplicitVertex vertex, VertexNormals nor
     vec2 weights = explicit_weights(instance, vertex);
     vec3 target = mix(unpack_normal(normals.target), unpack_normal(normals.second_target), weights.y);
     vec3 mean = mix(unpack_normal(normals.normal), target, weights.x);
-    // None points down: their mean is not zero, unless two are level and opposite.
+    // Normals do not point down: their mean is zero only if two are horizontal and opposite.
     return dot(mean, mean) > 0.0 ? normalize(mean) : vec3(0.0, 1.0, 0.0);
 }
 
@@ -208,7 +208,7 @@ float quadrant_height(Instance instance, ivec2 at, int level, uint weight) {
     return morphed_height(sampled, target, unit_weight(weight));
 }
 
-Placed hung_vertex(Instance instance, SkirtWeights weights, ivec2 turned) {
+Placed skirted_vertex(Instance instance, SkirtWeights weights, ivec2 turned) {
     SkirtVertex vertex = skirt_vertex(instance, turned);
     int level = quadrant_level(instance, vertex.quadrant);
     uint weight = (weights.inside >> (8 * vertex.quadrant)) & 255 & ~FINER;
@@ -258,7 +258,7 @@ Placed slot_vertex(Instance instance, SlotWeights weights, ivec2 turned) {
 Placed placed(Instance instance, ivec2 position) {
     ivec2 turned = turned_position(instance, position);
     if (SKIRTS && instance.weights_kind == SKIRT_WEIGHTS) {
-        return hung_vertex(instance, skirt_weights(instance), turned);
+        return skirted_vertex(instance, skirt_weights(instance), turned);
     }
     if (!MORPH) return Placed(lattice_position(instance, turned), sampled_height(instance, turned), instance.level);
     if (DISTANCE) return distant_vertex(instance, distance_weights(instance), turned);

@@ -1,4 +1,4 @@
-// Clear sky by direction: what lies behind the land, what lights it from above and what fog fades to.
+// Colour of the clear sky in a direction; fog fades to it.
 
 vec3 sky(vec3 direction) {
     float up = clamp(direction.y, 0.0, 1.0);

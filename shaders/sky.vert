@@ -1,5 +1,5 @@
 #version 460
-// One triangle over the whole picture, at infinite distance.
+// One triangle over the picture, at infinite distance.
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 

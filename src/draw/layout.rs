@@ -40,11 +40,11 @@ shared! {
     struct RenderOrigin {
         /// The lattice position nearest the eye.
         at: ivec2,
-        /// That position relative to the eye (x, z), metres.
+        /// Offset from the eye to `at` in plan (x, z), metres.
         relative: vec2,
         /// A height near the eye's, metres, which vertices subtract before anything else.
         height: float,
-        /// That height relative to the eye (y), metres.
+        /// Offset from the eye to `height` (y), metres.
         height_relative: float,
     }
 

@@ -77,7 +77,7 @@ fn repeated(field: &Field, at: i32, axis: usize) -> i32 {
     if field.is_tiled() && at.unsigned_abs() > FAR { at % field.stored()[axis] as i32 } else { at }
 }
 
-/// A lattice vertex as it is drawn.
+/// A lattice vertex at its drawn position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// Lattice position.
@@ -93,7 +93,7 @@ pub fn placed(field: &Field, frame: &Frame, instance: &Instance, position: [i32;
     let turned = turned_position(instance, position);
     match instance.weights() {
         Weights::Slots(weights) => slot_vertex(field, frame, instance, &weights, turned),
-        Weights::Skirts(weights) => hung_vertex(field, frame, instance, &weights, turned),
+        Weights::Skirts(weights) => skirted_vertex(field, frame, instance, &weights, turned),
         Weights::Distance(weights) => distant_vertex(field, frame, instance, &weights, turned),
     }
 }
@@ -109,7 +109,13 @@ fn slot_vertex(field: &Field, frame: &Frame, instance: &Instance, weights: &Slot
 }
 
 /// A vertex (after the rotation) of a mesh with skirts. It has the weight of its quadrant.
-fn hung_vertex(field: &Field, frame: &Frame, instance: &Instance, weights: &SkirtWeights, turned: [i32; 2]) -> Placed {
+fn skirted_vertex(
+    field: &Field,
+    frame: &Frame,
+    instance: &Instance,
+    weights: &SkirtWeights,
+    turned: [i32; 2],
+) -> Placed {
     let vertex = skirts::skirt_vertex(instance, turned);
     let level = skirts::quadrant_level(instance, vertex.quadrant);
     let height = quadrant_height(field, frame, instance, vertex.at, level, weights.inside(vertex.quadrant));

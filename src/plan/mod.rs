@@ -1,5 +1,6 @@
-//! What a scene needs, and therefore what is left out: worked out before anything is made on the device, and
-//! everything on the device is made from it alone.
+//! The plan of a scene: the features it needs, and those that are omitted.
+//!
+//! It is made before any object on the device, and alone decides which objects exist.
 
 mod builder;
 mod colour;
@@ -19,67 +20,67 @@ pub use features::{FEATURES, Feature, mip_levels};
 pub use forced::Forced;
 pub use look::Look;
 
-/// What the device allows, as far as the plan depends on it.
+/// The limits of a device on which plans depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceLimits {
-    /// Largest side of a 2D image.
+    /// Maximum side of a 2D image, texels.
     pub image_side: u32,
-    /// Most layers of an image.
+    /// Maximum number of layers of an image.
     pub image_layers: u32,
-    /// Whether height textures can be filtered linearly.
+    /// True if samplers can filter height textures linearly.
     pub filters_heights: bool,
 }
 
-/// The features of one scene's pipelines and resources.
+/// The features of a scene's pipelines and resources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePlan {
-    /// 16-bit heights stay 16-bit.
+    /// The height texture holds 16-bit codes.
     pub coded: bool,
     /// The field repeats.
     pub tiled: bool,
     /// Some samples have no data.
     pub holes: bool,
-    /// A ceiling lies over the field: its heights are there, and a lamp at the eye lights both.
+    /// A ceiling lies over the field: a second height texture, and a lamp at the eye.
     pub ceiling: bool,
     /// Fog is computed.
     pub fog: bool,
-    /// What colours say; `Overlay` keeps a picture.
+    /// The quantity that colours show.
     pub colour: Colour,
-    /// Edges only.
+    /// Triangles are drawn as edges.
     pub wireframe: bool,
     /// Side of a page of the height texture as a power of two; 0: one page holds the whole field.
     pub page_shift: u32,
-    /// Normals filter heights with the device's sampler.
+    /// The device's sampler filters heights for normals.
     pub filtered: bool,
-    /// What the technique's lists ask for.
+    /// The pipelines that the technique's lists need.
     pub requirements: PipelineRequirements,
-    /// The draws that there are programs for.
+    /// The kinds of draws that have pipelines.
     pub draws: DrawKinds,
-    /// The ground's materials are there, and looked up.
+    /// Detail textures cover the ground.
     pub detail: bool,
-    /// Timestamps and pipeline statistics are taken.
+    /// Timestamp and pipeline statistics queries run.
     pub measured: bool,
     /// Pictures go to a window.
     pub windowed: bool,
-    /// Samples stored along (x, z).
+    /// Number of samples stored along (x, z).
     pub stored: [u32; 2],
-    /// Texels of the picture that may be laid over (x, z).
+    /// Size of the overlay picture, texels (x, z).
     pub overlay: Option<[u32; 2]>,
-    /// How it is cut where it is there in parts.
+    /// Layout of the overlay as a virtual texture, if it is one.
     pub maps: Option<VirtualTextureLayout>,
-    /// Where it lies over the field.
+    /// Position of the overlay on the field.
     pub drape: Drape,
-    /// How texels of the ground are kept, if they are asked for.
+    /// Layout of the virtual ground, if colours show it.
     pub ground: Option<VirtualGroundLayout>,
-    /// What was kept and left out by hand.
+    /// Features that were kept or omitted by hand.
     pub forced: Forced,
 }
 
-/// Pages of fewer samples a side than 2^4 are not worth their lookup.
+/// Smallest side of a page as a power of two: smaller pages cost more in lookups than they save.
 const MIN_PAGE_SHIFT: u32 = 4;
 
-/// The side of a page of the height texture as a power of two: the largest whose pages hold at most an eighth more texels
-/// than samples or, where none does, that with the fewest texels. 0: one image holds all samples.
+/// The side of a page of the height texture as a power of two; 0: one image holds all samples. The largest side whose
+/// pages hold at most an eighth more texels than samples, or else the side with the fewest texels.
 fn page_shift(stored: [u32; 2], device: &DeviceLimits) -> u32 {
     if stored.iter().all(|&n| n <= device.image_side) {
         return 0;
@@ -93,14 +94,14 @@ fn page_shift(stored: [u32; 2], device: &DeviceLimits) -> u32 {
     tight.or_else(|| shifts().min_by_key(|&shift| texels(shift))).unwrap_or(largest)
 }
 
-/// One feature of a plan and what became of it.
+/// A feature that a plan keeps or omits.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Decision {
-    /// What it is.
+    /// Its name.
     pub feature: &'static str,
-    /// Why it is kept or left out.
+    /// The reason.
     pub reason: String,
-    /// Device bytes that leaving it out saves, or that it takes.
+    /// Device bytes that it takes, or that omitting it saves.
     pub bytes: u64,
 }
 
@@ -128,8 +129,10 @@ impl ScenePlan {
         }
     }
 
-    /// The same plan with one feature kept whether it is needed or not, by its [`word`](forced::word); or why that
-    /// cannot be.
+    /// The plan with one more feature, named by its [`word`](forced::word), whether the scene needs it or not.
+    ///
+    /// # Errors
+    /// If there is no such feature, or it cannot be forced.
     pub fn keeping(&self, name: &str) -> Result<Self, String> {
         let mut plan = self.clone();
         for (feature, keep) in Forced::default().with(name, true)?.each() {
@@ -138,7 +141,7 @@ impl ScenePlan {
         Ok(plan)
     }
 
-    /// Heights in several pages although one would hold them, half as long as the longer side or shorter.
+    /// Cuts heights that fit one page into pages at most half as long as the field's longer side.
     fn cut_into_pages(&mut self) {
         let longest = self.stored[0].max(self.stored[1]).max(4);
         if self.page_shift == 0 {
@@ -171,28 +174,28 @@ impl ScenePlan {
         }
     }
 
-    /// Whether what is drawn is looked at on the host first: its triangles say which texels the ground needs.
+    /// Returns true if the host reads the draw list: its triangles tell which texels of the virtual ground are needed.
     pub fn reads_lists(&self) -> bool {
         self.ground.is_some()
     }
 
-    /// Whether pictures need a depth buffer.
+    /// Returns true if pictures need a depth buffer.
     pub fn has_depth(&self) -> bool {
         self.requirements.depth_mode == DepthMode::Buffer
     }
 
-    /// Texels of a page of the height texture (x, z).
+    /// Size of a page of the height texture, texels (x, z).
     pub fn page_size(&self) -> [u32; 2] {
         if self.page_shift == 0 { self.stored } else { [1 << self.page_shift; 2] }
     }
 
-    /// Pages of the height texture along (x, z).
+    /// Number of pages of the height texture along (x, z).
     pub fn pages(&self) -> [u32; 2] {
         let page = self.page_size();
         [0, 1].map(|k| self.stored[k].div_ceil(page[k]))
     }
 
-    /// Bytes of a stored height.
+    /// Size of a stored height, bytes.
     pub fn texel_bytes(&self) -> u64 {
         if self.coded { 2 } else { 4 }
     }
@@ -222,7 +225,7 @@ mod tests {
             let pages = stored.iter().map(|n| u64::from(n.div_ceil(1 << found))).product::<u64>();
             assert!(found == 0 || pages <= 2048, "{stored:?}: {pages} pages");
         }
-        // What no layers hold is refused by the largest pages.
+        // A field that no layers hold gets the largest pages; the check of layers rejects it.
         assert_eq!(page_shift([1 << 30, 1 << 30], &device), 14);
     }
 }

@@ -1,4 +1,4 @@
-//! The structs of draw/layout.rs lie in the compiled SPIR-V where the host has them.
+//! Shared structs have the same layout on the host and in the compiled SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};
 

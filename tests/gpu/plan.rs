@@ -1,4 +1,4 @@
-//! What a scene does not need is left out, and forcing it in changes nothing that can be seen.
+//! Features that a scene does not need are omitted, and forcing one changes no picture.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ fn forced_features_show_the_same_picture() {
         let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
-        // Nobody says how far.
+        // All weights are 0.
         same(
             "morphing",
             plan.with_requirements(PipelineRequirements {
@@ -52,10 +52,10 @@ fn forced_features_show_the_same_picture() {
     });
 }
 
-/// Every technique, every feature that its scene leaves out: kept by hand it takes what the plan says, and the picture
-/// is the same wherever the scene cannot tell.
+/// For every technique and every feature that its scene omits: kept by hand, the feature takes the memory in the plan,
+/// and the picture does not change.
 #[test]
-fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
+fn every_omitted_feature_saves_something_and_changes_no_picture() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
@@ -102,7 +102,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
                 kept_in_some.insert(saving.feature);
             }
         }
-        // Nothing is measured in a scene that leaves queries out; all others are left out in some scene above.
+        // Scenes with queries are needed to measure; every other feature is omitted in some scene above.
         let forcible = FEATURES.iter().filter(|f| f.can_be(true) && f.name != "queries").map(|f| f.name);
         assert!(forcible.clone().all(|name| kept_in_some.contains(name)), "{kept_in_some:?}");
         assert_eq!(kept_in_some.len(), forcible.count());
@@ -110,7 +110,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
 }
 
 #[test]
-fn what_is_left_out_by_hand_is_not_there() {
+fn features_omitted_by_hand_are_off() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [96, 64], 1.0);

@@ -1,4 +1,4 @@
-//! `position.glsl` and its CPU twin agree to the bit.
+//! `position.glsl` and its CPU reference agree to the bit.
 
 use std::sync::Arc;
 
@@ -16,14 +16,14 @@ use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with its weights or made-up ones.
+/// Every vertex of every third instance that a technique draws, with its own weights or random ones.
 fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
     let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
+        // Any bytes are valid weights; quadrants of level 0 cannot be finer.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
         let inside = random(0) & finer;
@@ -47,7 +47,7 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
 /// Lattice vertices of two techniques, and explicit vertices with weights of their own.
 fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
     let forms: &[(&str, &[&str])] = match morph {
-        // Without weights the program does not know of half samples.
+        // Half samples occur only with weights.
         Morph::No => &[("geomipmap", &["block=17"])],
         Morph::ByInstance => &[
             ("geomipmap", &["block=17"]),
