@@ -9,8 +9,8 @@
 //! - Towards finer levels, τ moves only as far as the steepest likely slope allows without exceeding the target by a
 //!   fifth.
 //! - An unexplained cost is accepted only if the next one agrees, so a single slow frame moves nothing.
-//! - If the cost is a staircase, the nearest tolerances known to be too expensive and cheap enough converge on the
-//!   step, and the cheap one is kept.
+//! - If the cost is a staircase, the bounds known to be too expensive and cheap enough converge on the step. The cheap
+//!   one is kept.
 
 /// Target of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,9 +6,9 @@
 //! are Newton steps from an integer estimate. Values are clamped away from tiny and huge ones, because a device may
 //! flush subnormal numbers.
 //!
-//! Rounding is conservative. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves, and a sum along a
-//! direction by 12 u of its terms, which [`SLACK`] covers. The error margin exceeds the true one by at most 80 u and
-//! twice the error of [`inverse_roots`], less than 2⁻¹⁶; [`GUARD`] subtracts four times that.
+//! Rounding is conservative. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves. A sum along a direction
+//! is off by at most 12 u of its terms, which [`SLACK`] covers. The error margin exceeds the true one by at most 80 u
+//! and twice the error of [`inverse_roots`], less than 2⁻¹⁶; [`GUARD`] subtracts four times that.
 //!
 //! A node inside another is visible only if the other one is, rounding included, because every step is monotonic in the
 //! node's corners.

@@ -12,12 +12,12 @@
 //!   `draw-per-cluster`). With `gpu-driven` the device selects the clusters. The baseline `draw-per-block` draws the
 //!   same triangles with one draw per block.
 //! - Under the metric `certified` the error is a bound; that of eq. 1 is not one off the view axis.
-//! - Neighbours are within one level of each other, and a side that meets a coarser block snaps to its edge, so no
-//!   skirts are needed. `seams=skirts` is as published except for the skirts' depth, which follows from the errors of
-//!   both sides and is 0 where they do not differ.
-//! - With `morph=on` the blocks in a node morph into it by eq. 3 and 4, with a weight v for each quadrant: α = ½ (1 −
-//!   v) for a quadrant of one block, α = ½ + ½ (1 − v) for one of four. Sides have their own weights, those of the
-//!   coarser of their two blocks, so that both agree (not with skirts).
+//! - Neighbours are within one level of each other, and a side that meets a coarser block snaps to its edge. No skirts
+//!   are needed. `seams=skirts` is as published except for the skirts' depth, which follows from the errors of both
+//!   sides and is 0 where they do not differ.
+//! - With `morph=on` the blocks in a node morph into it by eq. 3 and 4. Each quadrant has a weight v: α = ½ (1 − v) for
+//!   a quadrant of one block, α = ½ + ½ (1 − v) for one of four. Sides have their own weights, those of the coarser of
+//!   their two blocks, so that both agree (not with skirts).
 //! - With `morph=distance` every vertex has a weight by its own distance, so edges agree by construction. The errors
 //!   are then those of whole levels (module `morph_ranges`), and finer levels extend further than needed at most
 //!   places.

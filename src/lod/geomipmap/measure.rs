@@ -1,15 +1,15 @@
 //! Measures the distance of a block's surface from the samples, at each level and while it morphs.
 //!
-//! A block that morphs from level l to l + 1 has a weight v inside, and a weight e on each side, from 0 (level l)
-//! through 1 (level l + 1) to 2 (level l + 2). A vertex moves on a straight line with the one weight it depends on.
-//! Inside next to a side, it moves with v and with the e of the sides that contain the ends of its target. The drawn
-//! height at a sample is therefore affine in each weight between whole numbers. The largest distance is at a corner of
-//! that cube: v in {0, 1}, each e in {0, 1, 2}. Each corner is a fixed shape, and these shapes are measured.
+//! A block that morphs from level l to l + 1 has a weight v inside and a weight e on each side. e is 0 at level l, 1 at
+//! level l + 1 and 2 at level l + 2. A vertex moves on a straight line with the one weight it depends on. Inside next
+//! to a side, it moves with v and with the e of the sides that contain the ends of its target. The drawn height at a
+//! sample is therefore affine in each weight between whole numbers. The largest distance is at a corner of that cube: v
+//! in {0, 1}, each e in {0, 1, 2}. Each corner is a fixed shape, and these shapes are measured.
 //!
 //! A triangle depends on one side only, also at a block's corners, where cells have their diagonals from that corner at
 //! both levels. All sides are therefore measured at the same e. Most corners of the cube are shapes that a level draws
-//! anyway, stitched or not. New are v = 0 with e = 2 (level l inside, two levels coarser on the sides) and v = 1 with e
-//! = 0 (level l + 1 inside, level l on the sides).
+//! anyway, stitched or not. Two are new. v = 0 with e = 2 is level l inside and two levels coarser on the sides. v = 1
+//! with e = 0 is level l + 1 inside and level l on the sides.
 
 use super::mesh;
 use crate::draw::Instance;

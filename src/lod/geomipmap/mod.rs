@@ -10,8 +10,8 @@
 //! - Partial blocks at the far edges are drawn, not dropped. Vertices beyond the field collapse onto its edge.
 //! - The six border classes of its outlook are the default, its sixteen masks an option. Its levels by distance exist
 //!   beside levels by error.
-//! - `morph=on` adds the vertex morphing of its outlook. Levels are continuous numbers (see [`levels`]), a side has the
-//!   coarser level of its two blocks, and vertices that the next level lacks move to their places in it.
+//! - `morph=on` adds the vertex morphing of its outlook. Levels are continuous numbers (see [`levels`]), and a side has
+//!   the coarser level of its two blocks. Vertices that the next level lacks move to their places in it.
 //! - Blocks are culled by a quadtree and drawn instanced in one indirect call. The variant `draw-per-block` records two
 //!   draws for each block.
 //!
@@ -156,8 +156,8 @@ impl GeoMipMap {
 
     /// Returns the morph weights of a block's inside and sides, relative to its whole level. A side has the coarser
     /// level of its two blocks; the other block is at most one level finer, so its error bound covers it. The inside of
-    /// a block that extends beyond the field does not morph, nor does a side between two such blocks, because midpoints
-    /// are not vertices there.
+    /// a block that extends beyond the field does not morph, because midpoints are not vertices there. Nor does a side
+    /// between two such blocks.
     fn weights(&self, block: usize) -> SlotWeights {
         let base = self.level(block) * ONE;
         let partial = |block| self.blocks.is_partial(block);

@@ -1,8 +1,8 @@
 //! Morphs vertices to the next level: vertically to the edge of that level, or along the edge into one of its ends
 //! (Finch & Bishop, §4.9).
 //!
-//! A vertex that slides has positions between samples. Its path has as many steps as a sample has fractional parts, so
-//! each position lies exactly on the lattice of these parts and on the edge. The ends of the edge do not move while a
+//! A vertex that slides has positions between samples. Its path has as many steps as a sample has fractional parts.
+//! Each position lies exactly on the lattice of these parts and on the edge. The ends of the edge do not move while a
 //! vertex slides between them, because the table's levels begin far enough apart ([`Radial`](super::table::Radial)). No
 //! triangle therefore flips: the vertex slides on a side of a triangle of the next level, and that triangle does not
 //! move. The vertex disappears in the last step. Reaching the end before that would leave triangles without area beside

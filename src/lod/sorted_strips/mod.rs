@@ -7,10 +7,10 @@
 //! vertices of the front edges behind it ([`shapes`], [`walk`]).
 //!
 //! Differences from the paper:
-//! - The level of a place is that of the *square* ahead, not of the vertex ahead, so that an error bound can hold over
-//!   all of it. With `level=uniform` it is the published table by squared distance; its Lipschitz condition is checked
-//!   and repaired ([`table`]). With `level=certified` it follows from errors measured for every shape that a square may
-//!   take ([`measure`], [`certified`]). That set is closed over squares that touch ([`splits`]).
+//! - The level of a place is that of the *square* ahead, not of the vertex ahead. An error bound can then hold over all
+//!   of the square. With `level=uniform` it is the published table by squared distance; its Lipschitz condition is
+//!   checked and repaired ([`table`]). With `level=certified` it follows from errors measured for every shape that a
+//!   square may take ([`measure`], [`certified`]). That set is closed over squares that touch ([`splits`]).
 //! - Shapes are combined where finer quads are on several sides of one, for which the published five do not suffice.
 //! - Strips are walked outward from the eye on both sides of it, front to back; the paper walks back to front in one
 //!   direction. `order=back` reverses the list; both orders have the same triangles. `order=painter` draws back to
@@ -18,10 +18,10 @@
 //! - A quad's triangles are sorted too, by the eye's side of the lines between them. So are quads in the eye's own row
 //!   and column of pages, where some rays run against the walk ([`depth_sorter`]).
 //! - The far plane that approaches as the eye descends (§4.10, setting `far`) omits whole pages, including visible
-//!   terrain. [`DrawList::reach_m`] states the distance, so that error measurements exclude it. Limiting the load does
-//!   not require it: at constant screen-space size the load hardly grows on descent. Measured over 4097 × 4097 samples
-//!   of 10 m, pages of 16, `level=uniform`, `edge=8`, 1280 × 720 pixels, from 1000 m down to 15 m: 221 k to 253 k
-//!   triangles are drawn, with `far=32` 220 k to 134 k, with `far=8` 145 k to 32 k.
+//!   terrain. [`DrawList::reach_m`] states the distance, and the watertightness check respects it. Limiting the load
+//!   does not require it: at constant screen-space size the load hardly grows on descent. Measured over 4097 × 4097
+//!   samples of 10 m, pages of 16, `level=uniform`, `edge=8`, 1280 × 720 pixels, from 1000 m down to 15 m. Without a
+//!   far plane 221 k to 253 k triangles are drawn; `far=32` draws 220 k to 134 k; `far=8` draws 145 k to 32 k.
 //! - Vertices morph to the next level only with `level=uniform`, because a morph would use up part of an error bound.
 //! - Squares in a band around the picture are as fine as those in it ([`certified::guarded`]). Measured on a circle
 //!   flown in 24 frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px: a band of a quarter reduces the largest jump

@@ -2,8 +2,8 @@
 //!
 //! Rows of pages are walked and drawn in the usual order, a few at a time. A part handed over for drawing cannot be
 //! taken back, so a frame is divided only if it is certain to fit the limits. On llvmpipe, which draws on the host's
-//! own cores, nothing is gained. Medians of 12 frames of 132 000 triangles in three rounds: 16 to 26 ms whole, 20 to 23
-//! ms in two parts, 17 to 28 ms in four, 17 to 30 ms in eight.
+//! own cores, nothing is gained. Medians of 12 frames of 132 000 triangles, in three rounds: 16 to 26 ms whole. Two
+//! parts take 20 to 23 ms, four take 17 to 28 ms, eight take 17 to 30 ms.
 
 use super::pages::Row;
 use super::sequence::Sequence;

@@ -119,7 +119,7 @@ impl Steps {
     }
 
     /// Returns the minimum distance at which a level may begin, metres. It is one diagonal of a square of the level
-    /// before beyond that level's beginning, so that squares touching its last split ones are split too.
+    /// before beyond that level's beginning, which also splits squares that touch its last split ones.
     fn min_m(&self, level: u32, diagonal_m: f64) -> f64 {
         // No square is split if the level before holds everywhere.
         let is_needed = level > 1 && self.begins[level as usize - 1] > 0;

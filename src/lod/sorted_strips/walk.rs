@@ -12,8 +12,8 @@
 //! ```
 //!
 //! - **Split.** If the square ahead is split, the quad before it is drawn with a middle on its leading side (D). A
-//!   strip of half the size fills the rear half as far as it can, and the main strip continues with half the step in
-//!   the front half. A page begins as one strip of its own size, which splits at once if needed: the published start of
+//!   strip of half the size fills the rear half as far as it can. The main strip continues in the front half with half
+//!   the step. A page begins as one strip of its own size, which splits at once if needed: the published start of
 //!   strips (§4.7).
 //! - **End.** A rear strip ends at the first place where the quad of twice its size need not be split, because it could
 //!   only grow forward.
@@ -23,7 +23,7 @@
 //!
 //! Vertices behind a strip are found in an array of marks: for each `u`, the last `v` at which a vertex was used. This
 //! is the published map of vertices by frame, reduced to one entry per column, because no strip looks further back.
-//! Rows of pages are walked independently. The front edge of the row behind follows from the level function, and its
+//! Rows of pages are walked independently. The front edge of the row behind follows from the level function. Its
 //! vertices are generated again, as the paper copies them from page to page.
 
 use super::blend::Blend;

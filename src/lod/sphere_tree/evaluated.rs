@@ -1,11 +1,11 @@
 //! Sizes of diamonds of a procedural terrain, computed from its analytic bounds on demand and cached.
 //!
 //! Errors and balls are nested as the measured ones are ([`measure`](super::measure)), without visiting descendants.
-//! All descendants of a diamond of half length h lie within 3 h of its middle along the axes for a cell's diamond, and
-//! 2 h for a side's. Bounds of a part are within those of the whole, so errors are nested. The middles of parent and
-//! child are h apart from a cell's and h/√2 from a side's, and steps shrink by √2. A ball whose radius is the length of
-//! all following steps, plus the maximum change of height along them
-//! ([`Bounds::way_m`](crate::height::bezier::Bounds)), therefore contains the children's balls.
+//! All descendants of a cell's diamond of half length h lie within 3 h of its middle along the axes; those of a side's
+//! within 2 h. Bounds of a part are within those of the whole, so errors are nested. The middles of parent and child
+//! are h apart from a cell's and h/√2 from a side's, and steps shrink by √2. A ball whose radius is the length of all
+//! following steps, plus the maximum change of height along them ([`Bounds::way_m`](crate::height::bezier::Bounds)),
+//! therefore contains the children's balls.
 
 use std::sync::{Arc, PoisonError, RwLock};
 

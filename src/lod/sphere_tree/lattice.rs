@@ -177,8 +177,9 @@ impl Lattice {
         i64::from(bz - az) * i64::from(cx - ax) == i64::from(bx - ax) * i64::from(cz - az)
     }
 
-    /// Returns true if a diamond splits in every view, because it extends beyond the field and is larger than a square
-    /// of blocks that are culled together. No drawn wedge therefore extends beyond the square that it is culled with.
+    /// Returns true if a diamond splits in every view. It does if it extends beyond the field and is larger than a
+    /// square of blocks that are culled together. No drawn wedge therefore extends beyond the square that it is culled
+    /// with.
     pub fn always_splits(&self, middle: Place) -> bool {
         let Diamond { ends, apexes } = Diamond::around(middle);
         let has_area = |&apex: &Place| self.contains(apex) && !self.collapses([apex, ends[0], ends[1]]);
