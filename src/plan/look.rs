@@ -111,7 +111,7 @@ impl Look {
             Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
         };
         let placing = Frame::placing(field, view);
-        let overlay = self.drape_over(field).shares(placing.render_origin);
+        let overlay = self.drape_over(field).uv_from_samples(placing.render_origin);
         let repeats = |k: usize| Repeats::new(placing.render_origin[k], field.spacing[k]);
         Frame {
             height_range: tinted_range(field, range),
