@@ -22,7 +22,7 @@ fn without_noise_it_settles_in_fifteen_frames_and_does_not_overshoot() {
     for (slope, delay) in [0.3, 0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
         for (name, event, first_px, factor) in events() {
             let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.0, seed: 0 };
-            let frames = &load.fly(Target::Triangles(COST), first_px, 160)[event..];
+            let frames = &load.run(Target::Triangles(COST), first_px, 160)[event..];
             let (overshoot, settling) =
                 (overshoot(&frames[if event > 0 { delay } else { 0 }..]), settling(frames, 0.05));
             assert!(overshoot <= 0.2 && settling <= 15, "slope {slope}, delay {delay}, {name}: {overshoot} {settling}");
@@ -44,7 +44,7 @@ fn with_noise_of_thirty_percent_the_expected_cost_is_held() {
         for (name, event, first_px, factor) in events() {
             let of_seed = |seed: u64| {
                 let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.3, seed };
-                let frames = &load.fly(Target::FrameMs(COST), first_px, 120)[event..];
+                let frames = &load.run(Target::FrameMs(COST), first_px, 120)[event..];
                 // What was drawn before the change could be known is no overshoot.
                 let known = if event > 0 { delay + 1 } else { 0 };
                 (overshoot(&frames[known..]), settling(frames, 0.2) as f64)
@@ -65,7 +65,7 @@ fn noise_alone_makes_no_limit_cycle() {
     for delay in [1, 2, 3] {
         let of_seed = |seed: u64| {
             let load = Load { curve: &power(1.0), factor: &constant, delay, noise: 0.3, seed };
-            let frames = load.fly(Target::FrameMs(COST), 1.0, 400);
+            let frames = load.run(Target::FrameMs(COST), 1.0, 400);
             let moves = frames.windows(2).filter(|pair| pair[0].px != pair[1].px).count();
             let rms = (frames.iter().map(|frame| (frame.cost - 1.0).powi(2)).sum::<f64>() / 400.0).sqrt();
             (moves as f64 / 400.0, rms)
@@ -84,7 +84,7 @@ fn slopes_up_to_ten_thousand_are_held_once_they_are_known() {
         for factor in [1.5, 3.0, 1.0 / 1.5, 1.0 / 3.0] {
             let load = Load { curve: &power(slope), factor: &step(factor), delay, noise: 0.0, seed: 0 };
             let first_px = (-0.5 / slope).exp();
-            let frames = load.fly(Target::Triangles(COST), first_px, 160);
+            let frames = load.run(Target::Triangles(COST), first_px, 160);
             let after = &frames[EVENT..];
             let (found, overshoot, settling) =
                 (settling(&frames[..EVENT], 0.05), overshoot(&after[delay..]), settling(after, 0.05));
@@ -106,7 +106,7 @@ fn on_stairs_it_rests_on_the_cheap_side() {
     for (delay, noise, first_px) in [1, 2, 3].into_iter().flat_map(|d| [(d, 0.0, 7.0), (d, 0.0, 0.3), (d, 0.3, 7.0)]) {
         let load = Load { curve: &stairs, factor: &constant, delay, noise, seed: 5 };
         let target = if noise > 0.0 { Target::FrameMs(COST) } else { Target::Triangles(COST) };
-        let frames = load.fly(target, first_px, 400);
+        let frames = load.run(target, first_px, 400);
         let rested = frames.iter().rposition(|frame| frame.cost > 1.0).unwrap_or(0);
         let dear = frames.iter().filter(|frame| frame.cost > 1.0).count();
         let last = frames[399];
@@ -121,7 +121,7 @@ fn a_single_slow_frame_moves_nothing() {
     for (delay, spike) in [1, 2, 3].into_iter().flat_map(|d| [(d, 5.0), (d, 0.2)]) {
         let factor = |k: usize| if k == EVENT { spike } else { 1.0 };
         let load = Load { curve: &power(1.5), factor: &factor, delay, noise: 0.0, seed: 0 };
-        let frames = load.fly(Target::Triangles(COST), 1.0, 100);
+        let frames = load.run(Target::Triangles(COST), 1.0, 100);
         assert!(frames.iter().all(|frame| frame.px == frames[EVENT].px), "delay {delay}, × {spike}");
     }
 }
@@ -132,7 +132,7 @@ fn it_does_not_wind_up_at_the_ends() {
     for (delay, factor) in [1, 2, 3].into_iter().flat_map(|d| [(d, 1e4), (d, 1e-4)]) {
         let load = |k: usize| if (EVENT..3 * EVENT).contains(&k) { factor } else { 1.0 };
         let load = Load { curve: &power(1.0), factor: &load, delay, noise: 0.0, seed: 0 };
-        let frames = load.fly(Target::Triangles(COST), 1.0, 300);
+        let frames = load.run(Target::Triangles(COST), 1.0, 300);
         let end = frames[3 * EVENT - 1].px;
         let expected = if factor > 1.0 { RANGE_PX[1] } else { RANGE_PX[0] };
         assert!((end / expected - 1.0).abs() < 1e-9, "delay {delay}, × {factor}: {end} px");
@@ -149,7 +149,7 @@ fn slow_changes_are_followed() {
         let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
         for (name, factor) in [("ramp", &ramp as &(dyn Fn(usize) -> f64 + Sync)), ("swing", &swing)] {
             let load = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 };
-            let frames = load.fly(Target::Triangles(COST), 1.0, 240);
+            let frames = load.run(Target::Triangles(COST), 1.0, 240);
             let worst = frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max);
             println!("delay {delay}, {name}: {worst:.3}");
             // What changes in the frames until it is known: 2 % a frame, and 0.3 · 2π / 40 = 4.7 %.
@@ -166,7 +166,7 @@ fn slow_first_frames_do_not_hold_it_back() {
     for delay in [1, 2, 3] {
         let factor = |k: usize| if k < 3 { 10.0 } else { 1.0 };
         let load = Load { curve: &curve, factor: &factor, delay, noise: 0.04, seed: 3 };
-        let frames = load.fly(Target::FrameMs(COST), 0.5, 120);
+        let frames = load.run(Target::FrameMs(COST), 0.5, 120);
         let settled = settling(&frames[3..], 0.1);
         println!("delay {delay}: settled in {settled} frames");
         assert!(settled <= 60, "delay {delay}: {settled}");
