@@ -1,11 +1,11 @@
-//! The structs of draw/layout.rs lie in the compiled SPIR-V where the host has them.
+//! Tests that the structs of `draw/layout.rs` have the same offsets in the compiled SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use cuesta::draw::layout;
 use cuesta::gpu::shaders;
 
-/// Offsets of the members of every named struct of a module: struct name → member name → offset.
+/// Returns the member offsets of every named struct of a module: struct name → member name → offset.
 fn offsets(words: &[u32]) -> BTreeMap<String, BTreeMap<String, u32>> {
     let text = |words: &[u32]| {
         let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
@@ -48,6 +48,6 @@ fn shared_structs_have_the_same_offsets_on_both_sides() {
             seen.insert(name);
         }
     }
-    // The others reach shaders as vertex attributes only, whose offsets are the host's own.
+    // The others are vertex attributes only, whose offsets are set on the CPU side.
     assert!(["Frame", "Instance", "ExplicitVertex"].iter().all(|name| seen.contains(name)), "{seen:?}");
 }

@@ -1,4 +1,5 @@
-//! What a scene does not need is left out, and forcing it in changes nothing that can be seen.
+//! Tests of scene plans: features that a scene does not need are left out, and forcing them in does not change the
+//! image.
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ fn without_holes() -> Arc<Field> {
 }
 
 #[test]
-fn forced_features_show_the_same_picture() {
+fn forced_features_give_the_same_image() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
@@ -27,7 +28,7 @@ fn forced_features_show_the_same_picture() {
         let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
-        // Nobody says how far.
+        // Without morph weights.
         same(
             "morphing",
             plan.clone().with_requirements(PipelineRequirements {
@@ -52,10 +53,10 @@ fn forced_features_show_the_same_picture() {
     });
 }
 
-/// Every technique, every feature that its scene leaves out: kept by hand it takes what the plan says, and the picture
-/// is the same wherever the scene cannot tell.
+/// For every technique and every omitted feature: forcing it in costs what the plan states, and does not change the
+/// image.
 #[test]
-fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
+fn omitted_features_save_resources_and_do_not_change_the_image() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
@@ -100,7 +101,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
                 kept_in_some.insert(saving.feature);
             }
         }
-        // Nothing is measured in a scene that leaves queries out; all others are left out in some scene above.
+        // Scenes without queries measure nothing; all other features are omitted in some scene above.
         let forcible = FEATURES.iter().filter(|f| f.can_be(true) && f.name != "queries").map(|f| f.name);
         assert!(forcible.clone().all(|name| kept_in_some.contains(name)), "{kept_in_some:?}");
         assert_eq!(kept_in_some.len(), forcible.count());
@@ -108,7 +109,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
 }
 
 #[test]
-fn what_is_left_out_by_hand_is_not_there() {
+fn a_feature_can_be_forced_off() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [96, 64], 1.0);
@@ -125,7 +126,7 @@ fn what_is_left_out_by_hand_is_not_there() {
 }
 
 #[test]
-fn fog_and_colours_are_seen() {
+fn looks_differ_visibly() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [96, 64], 1.0);
@@ -154,7 +155,7 @@ fn fog_and_colours_are_seen() {
 }
 
 #[test]
-fn a_field_beyond_one_image_is_paged_and_one_beyond_all_is_refused_by_name() {
+fn large_fields_are_paged_and_too_large_ones_name_the_limit() {
     let field = mountains();
     let device = DeviceLimits { image_side: 64, image_layers: 6, filters_heights: true };
     let plan = ScenePlan::new(&field, &Look::default(), &device).unwrap();

@@ -1,4 +1,4 @@
-//! `position.glsl` and its CPU twin agree to the bit.
+//! Tests that `position.glsl` and its CPU reference agree to the bit.
 
 use std::sync::Arc;
 
@@ -15,14 +15,14 @@ use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with its weights or made-up ones.
+/// Returns all vertices of every third instance that a technique draws, with its weights or random ones.
 fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
     let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
+        // Any bytes are valid weights; level 0 has no finer quadrants.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
         let mut weights =
@@ -41,10 +41,10 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
     queries.collect()
 }
 
-/// Lattice vertices of two techniques, and explicit vertices with weights of their own.
+/// Returns lattice vertices of several techniques, and explicit vertices with their own weights.
 fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
-    let forms: &[(&str, &[&str])] = match morph {
-        // Without weights the program does not know of half samples.
+    let configs: &[(&str, &[&str])] = match morph {
+        // Without weights the shader has no half samples.
         Morph::No => &[("geomipmap", &["block=17"])],
         Morph::ByInstance => &[
             ("geomipmap", &["block=17"]),
@@ -56,8 +56,8 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
         }
     };
     let is_made_up = morph == Morph::ByInstance;
-    let of_form = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, is_made_up);
-    let mut queries: Vec<_> = forms.iter().flat_map(of_form).collect();
+    let of_config = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, is_made_up);
+    let mut queries: Vec<_> = configs.iter().flat_map(of_config).collect();
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
             position: [(k % 37) as i32, (k / 37) as i32],
@@ -65,10 +65,10 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             target: 1200.0 + 1.7 * k as f32,
             second_target: 1400.0 - 0.9 * k as f32,
             morph: k as f32 / 1999.0,
-            // Of neither, of the vertex, of both.
+            // No region, that of the vertex, those of vertex and target.
             regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
         },
-        // Steep and level ones too; y is what x and z leave.
+        // Steep and level normals; y follows from x and z.
         normals: VertexNormals {
             normal: k.wrapping_mul(0x9e37_79b1),
             target: k.wrapping_mul(0x85eb_ca6b),
@@ -130,7 +130,7 @@ fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32
 }
 
 #[test]
-fn vertices_lie_where_the_cpu_says_to_the_bit() {
+fn vertex_positions_equal_the_cpu_reference() {
     on_device(|gpu| {
         let coded = mountains();
         compare(gpu, "16-bit", &coded, 0);
