@@ -102,7 +102,13 @@ fn progress(common: &Common, trials: &[CaseRun], draws: bool) -> ProgressBar {
     bar
 }
 
-fn row(common: &Common, folder: &Path, trial: &CaseRun, finding: &Finding, checker: Option<&mut dyn ImageChecker>) -> Row {
+fn row(
+    common: &Common,
+    folder: &Path,
+    trial: &CaseRun,
+    finding: &Finding,
+    checker: Option<&mut dyn ImageChecker>,
+) -> Row {
     let finite = |value: f64| value.is_finite().then_some(value);
     // A row is worth more than its counter-example.
     let files = counter_example(folder, trial, finding, checker).unwrap_or_else(|error| {

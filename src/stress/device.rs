@@ -131,7 +131,7 @@ fn is_as_listed(field: &Field, technique: &dyn Technique, renderer: &mut SceneRe
 
 impl ImageResults {
     fn findings(self) -> Vec<Finding> {
-        let holes = Finding::within("pixels of sky through land", self.holes as f64, 0.0);
+        let holes = Finding::within("pixels of sky through terrain", self.holes as f64, 0.0);
         vec![
             Finding { violation: self.holes_at, ..holes },
             Finding::holds("the device draws the list", self.drawn),

@@ -107,9 +107,9 @@ pub fn findings(origin_m: f64) -> Vec<Finding> {
 /// Returns a frame of a camera that moves slowly over the terrain.
 fn view(field: &Field, frame: usize) -> View {
     let start = field.world_at(30.0, 70.0, 330.0);
-    let placement = glam::DVec3::new(0.7, 0.1, -0.7) * STEP_M * frame as f64;
+    let travelled = glam::DVec3::new(0.7, 0.1, -0.7) * STEP_M * frame as f64;
     View {
-        eye: start + placement,
+        eye: start + travelled,
         world_from_eye: View::turned(-50.0, -20.0, 0.0),
         lens: Lens::Perspective { fov_x: 60f64.to_radians() },
         size: [1920, 1080],
