@@ -13,7 +13,7 @@ pub enum Voids {
     None,
     /// A disc around the middle.
     Lake,
-    /// About one sample in ten, at random.
+    /// About one sample in twenty, at random.
     Scattered,
     /// Everything east of a slanted line.
     East,
