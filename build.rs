@@ -86,6 +86,10 @@ mod shaders {
 
     fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind, define: Option<&str>) -> Result<Vec<u8>, String> {
         let source = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        // glslang cuts the source in its debug information at any byte, also within a character.
+        if !source.is_ascii() {
+            return Err(format!("{}: expected ASCII", path.display()));
+        }
         let mut options = CompileOptions::new().map_err(|e| e.to_string())?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_6);

@@ -41,7 +41,7 @@ fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[
         });
         sum[1] += times.fold(f64::INFINITY, f64::min);
         sum[0] += list.triangles() as f64;
-        let pages = strips.stats().into_iter().find(|stat| stat.0.starts_with("pages in "));
+        let pages = strips.stats().into_iter().find(|stat| stat.0 == "visible pages");
         sum[2] += pages.map_or(0.0, |stat| stat.1);
     }
     sum.map(|sum| sum / views.len() as f64)

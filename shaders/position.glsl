@@ -238,7 +238,7 @@ bool is_skirted(Instance instance) {
     return SKIRTS && (instance.cells & 1) == 1;
 }
 
-// Mesh units, quadrant, and the side that a skirt's vertex is beyond; −1: it is none.
+// Mesh units, quadrant, and the side that a skirt's vertex is beyond; -1 for a vertex of no skirt.
 struct SkirtVertex { ivec2 at; int quadrant; int side; };
 
 SkirtVertex skirt_vertex(Instance instance, ivec2 turned) {

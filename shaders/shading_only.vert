@@ -1,5 +1,5 @@
 #version 460
-// One triangle over the whole picture, and the points of space on its rays: far + depth · near, homogeneous.
+// One triangle over the whole picture, and the points of space on its rays: far + depth * near, homogeneous.
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 
