@@ -1,8 +1,8 @@
-//! How long each technique takes to select what is drawn, without a device:
-//! `cargo bench --no-default-features -- FILE [technique[:variant] …]`.
+//! Benchmark of each technique's selection, without a GPU: `cargo bench --no-default-features -- FILE
+//! [technique[:variant] …]`.
 //!
-//! Every frame of a path is selected once to warm up and then several times. In between other memory is read, as a frame
-//! is drawn in between: caches are cold.
+//! Every frame of a path is selected once to warm up and then several times. Other memory is read between selections,
+//! as drawing would do, so that caches are cold.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,15 +17,15 @@ use cuesta::view::{Metric, Tolerance, View};
 
 /// Frames of a path.
 const FRAMES: usize = 48;
-/// How often each frame is selected and timed.
+/// Timed selections per frame.
 const ROUNDS: usize = 5;
-/// Bytes read between two selections: more than caches hold.
+/// Bytes read between two selections: more than the caches hold.
 const CACHES: usize = 64 << 20;
-/// Where it is flown.
+/// Camera paths.
 const PATHS: [&str; 2] = ["circle", "skim"];
 
 fn main() {
-    // Cargo adds an option of its own.
+    // Cargo adds `--bench`.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     let Some((file, names)) = arguments.split_first() else {
         println!("skipped: no height file was given");

@@ -1,10 +1,12 @@
-//! Blow 2000 again: wedges looked at and time for a frame's splits and merges, by made-up spheres, by ROAM's queues and
-//! among all, at 10⁴ to 10⁶ wedges, along a slow, a fast and a leaping path; and the exponent rule against a logarithm.
+//! Benchmark of Blow 2000: wedges visited and time for a frame's splits and merges, at 10⁴ to 10⁶ wedges along slow,
+//! fast and leaping paths; and the exponent rule against a logarithm.
 //!
-//! ROAM stands here twice: its priorities wait for the way that the viewpoint has really gone, which is the best that
-//! they can, and for that at the largest speed it may have, as published: here the fast path's.
-//! And what is selected and sent for a frame where triangles are streamed, and where blocks are kept on the device.
-//! `cargo bench --no-default-features --bench spheres`, while nothing else runs; with `-- 100000 leaping` that alone.
+//! Compared are bounding spheres, bounding spheres with covers, ROAM's queues, and a test of all wedges. ROAM runs
+//! twice: with priorities delayed by the distance really travelled, its best case, and by the maximum speed (the fast
+//! path's), as published. Also measured: selection time and bytes sent per frame with streamed triangles and with
+//! resident blocks.
+//!
+//! `cargo bench --no-default-features --bench spheres` on an idle machine; `-- 100000 leaping` runs that case alone.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -28,17 +30,17 @@ use glam::DVec3;
 /// Samples along a side, and metres between them.
 const SIDE: u32 = 2049;
 const SPACING_M: f64 = 10.0;
-/// Frames of a path that count, after as many that do not.
+/// Timed frames of a path, after as many warm-up frames.
 const FRAMES: usize = 200;
-/// Metres a frame: a walk, and a flight at 300 m/s and 60 frames a second.
+/// Metres per frame: a walk, and a flight at 300 m/s and 60 frames per second.
 const SLOW_M: f64 = 0.05;
 const FAST_M: f64 = 5.0;
 
-/// Times that a path is walked: of each frame the shortest time counts, so that what else the machine does is no hitch.
+/// Repetitions of a path. The shortest time of each frame is used, to exclude other load.
 const ROUNDS: usize = 3;
 
-/// Medians and maxima of the counted frames.
-struct Row {
+/// Median and maximum over the timed frames.
+struct Measurement {
     visited: [usize; 2],
     time_us: [f64; 2],
 }
@@ -59,7 +61,7 @@ fn reach(px: f64) -> Reach {
     Reach::new(&view(DVec3::ZERO, px))
 }
 
-/// The tolerance, pixels, at which an eye sees so many wedges.
+/// Returns the tolerance, pixels, at which `wedges` wedges are drawn from an eye.
 fn tolerance(measured: &Measured, eye: DVec3, wedges: usize) -> f64 {
     let (mut splits, mut found) = (Splits::none(measured), Found::default());
     let [mut low, mut high] = [1e-3f64, 1e3];
@@ -72,18 +74,24 @@ fn tolerance(measured: &Measured, eye: DVec3, wedges: usize) -> f64 {
     high
 }
 
-/// A path of eyes, a curve at a speed or leaps.
+/// Returns eye positions along a curve with `step_m` metres per frame, or random jumps for `None`.
 fn path(measured: &Measured, step_m: Option<f64>) -> Vec<DVec3> {
     let extent = f64::from(SIDE - 1) * SPACING_M;
-    let place = |k: usize| match step_m {
+    let position = |k: usize| match step_m {
         Some(step) => DVec3::new(0.4, 0.0, 0.45) * extent + DVec3::new(0.8, 0.0, 0.6) * step * k as f64,
         None => DVec3::new((k as f64 * 0.618).fract(), 0.0, (k as f64 * 0.414).fract()) * extent,
     };
     let above = |at: DVec3| at + DVec3::Y * (measured.field.height_at(at.x, at.z).unwrap_or(0.0) + 30.0);
-    (0..2 * FRAMES).map(|k| above(place(k))).collect()
+    (0..2 * FRAMES).map(|k| above(position(k))).collect()
 }
 
-fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, count: usize, mut begin: impl FnMut() -> F) -> Row {
+/// Measures a function of the viewpoint along a path: wedges visited and time.
+fn measure<F: FnMut(&Viewpoint) -> usize>(
+    path: &[DVec3],
+    reach: Reach,
+    count: usize,
+    mut begin: impl FnMut() -> F,
+) -> Measurement {
     let mut round = || -> Vec<_> {
         let mut follow = begin();
         let measured = path.iter().map(|&eye| {
@@ -100,16 +108,16 @@ fn row<F: FnMut(&Viewpoint) -> usize>(path: &[DVec3], reach: Reach, count: usize
         (FRAMES..path.len()).map(|k| (rounds[0][k].0, shortest(k))).unzip();
     visited.sort_unstable();
     times.sort_unstable_by(f64::total_cmp);
-    Row { visited: [visited[FRAMES / 2], visited[FRAMES - 1]], time_us: [times[FRAMES / 2], times[FRAMES - 1]] }
+    Measurement { visited: [visited[FRAMES / 2], visited[FRAMES - 1]], time_us: [times[FRAMES / 2], times[FRAMES - 1]] }
 }
 
-fn following<W: CrossingTracker>(
+fn measure_follower<W: CrossingTracker>(
     begin: impl Fn() -> Follower<W>,
     measured: &Measured,
     path: &[DVec3],
     reach: Reach,
-) -> Row {
-    row(path, reach, ROUNDS, || {
+) -> Measurement {
+    measure(path, reach, ROUNDS, || {
         let mut follower = begin();
         move |from| {
             follower.follow(measured, from, usize::MAX);
@@ -118,9 +126,9 @@ fn following<W: CrossingTracker>(
     })
 }
 
-fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
-    // It does the same in every frame.
-    row(path, reach, 1, || {
+fn measure_all(measured: &Measured, path: &[DVec3], reach: Reach) -> Measurement {
+    // Every frame does the same work, so one round suffices.
+    measure(path, reach, 1, || {
         let (mut splits, mut found) = (Splits::none(measured), Found::default());
         move |from| {
             splits.refill(measured, from, &mut found, usize::MAX);
@@ -129,13 +137,12 @@ fn plain(measured: &Measured, path: &[DVec3], reach: Reach) -> Row {
     })
 }
 
-fn print(name: &str, Row { visited, time_us }: &Row) {
+fn print(name: &str, Measurement { visited, time_us }: &Measurement) {
     let ([visits, max], [us, longest]) = (visited, time_us);
     println!("    {name:22} {visits:8} wedges (most {max:8}) {us:9.1} µs (longest {longest:9.1})");
 }
 
-/// Selects along a path with a technique's own lists: medians and maxima of bytes sent and of time, after the frames that
-/// do not count.
+/// Measures selection time and bytes sent along a path with the technique's own lists.
 fn patches(field: &Arc<Field>, patches: &str, path: &[DVec3], px: f64) {
     let entry = lod::find("sphere-tree").expect("in the table");
     let settings = [("patches".to_string(), patches.to_string())];
@@ -188,18 +195,18 @@ fn main() {
     field.spacing = [SPACING_M; 2];
     let measured = Measured::new(Arc::new(field), 1.0, &Progress::default());
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let is_meant = |name: &str, others: &[&str]| {
+    let is_selected = |name: &str, others: &[&str]| {
         words.iter().any(|word| word == name) || !words.iter().any(|word| others.contains(&word.as_str()))
     };
     for wedges in [10_000, 100_000, 1_000_000] {
-        if !is_meant(&wedges.to_string(), &["10000", "100000", "1000000"]) {
+        if !is_selected(&wedges.to_string(), &["10000", "100000", "1000000"]) {
             continue;
         }
         let start = path(&measured, Some(FAST_M))[FRAMES];
         let px = tolerance(&measured, start, wedges);
         println!("{wedges} wedges, {px:.2} px");
         for (name, step) in [("slow", Some(SLOW_M)), ("fast", Some(FAST_M)), ("leaping", None)] {
-            if !is_meant(name, &["slow", "fast", "leaping"]) {
+            if !is_selected(name, &["slow", "fast", "leaping"]) {
                 continue;
             }
             let (path, reach) = (path(&measured, step), reach(px));
@@ -209,11 +216,20 @@ fn main() {
                 bounded.tracker().largest_speed = FAST_M;
                 bounded
             };
-            print("spheres", &following(|| Follower::<BoundingSpheres>::new(&measured), &measured, &path, reach));
-            print("spheres with covers", &following(|| Follower::<Covers>::new(&measured), &measured, &path, reach));
-            print("ROAM, way gone", &following(|| Follower::<Queues>::new(&measured), &measured, &path, reach));
-            print("ROAM, largest speed", &following(bounded, &measured, &path, reach));
-            print("plain", &plain(&measured, &path, reach));
+            print(
+                "spheres",
+                &measure_follower(|| Follower::<BoundingSpheres>::new(&measured), &measured, &path, reach),
+            );
+            print(
+                "spheres with covers",
+                &measure_follower(|| Follower::<Covers>::new(&measured), &measured, &path, reach),
+            );
+            print(
+                "ROAM, distance gone",
+                &measure_follower(|| Follower::<Queues>::new(&measured), &measured, &path, reach),
+            );
+            print("ROAM, largest speed", &measure_follower(bounded, &measured, &path, reach));
+            print("all wedges", &measure_all(&measured, &path, reach));
             patches(&measured.field, "streamed", &path, px);
             patches(&measured.field, "resident", &path, px);
         }

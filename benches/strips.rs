@@ -1,7 +1,8 @@
-//! Figure 5 of Finch & Bishop 1998 again: time to make a frame's triangles against their number, without rendering.
+//! Benchmark of figure 5 of Finch & Bishop 1998: time to generate a frame's triangles against their number, without
+//! rendering.
 //!
-//! Their scene: 8 × 8 pages of 64 × 64 cells tiled over the plane, a circle flown low above ground, one level scale a
-//! series. `cargo bench --no-default-features --bench strips`, while nothing else runs.
+//! Their scene: 8 × 8 pages of 64 × 64 cells tiled over the plane, and a circle flown low above ground; one level
+//! scale per series. `cargo bench --no-default-features --bench strips` on an idle machine.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,18 +13,18 @@ use cuesta::height::{Field, synth};
 use cuesta::lod::{self, Settings};
 use cuesta::view::{Metric, Tolerance, View};
 
-/// Frames of the circle that are timed, and times that each is.
+/// Timed frames of the circle, and repetitions of each.
 const FRAMES: usize = 50;
 const REPEATS: usize = 5;
 
-/// Lengths of triangles' sides: from a page in one quad to the field's own samples far away.
+/// Triangle edge lengths, pixels: from one quad per page to the field's full resolution.
 const EDGES_PX: [f64; 12] = [400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
 
-/// The same on land so small that the visible pages are about as many as theirs, 35.
+/// Edge lengths for a field so small that about as many pages are in view as in the paper, 35.
 const FEW_EDGES_PX: [f64; 3] = [400.0, 100.0, 40.0];
 
-/// A series: mean triangles, mean of the frames' shortest times, seconds, and mean visible pages; the time of all
-/// frames' lookups included.
+/// Returns mean triangles, mean of the frames' shortest times in seconds, and mean pages in view. Times include the
+/// lookups of all frames.
 fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[View]) -> [f64; 3] {
     let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
     let entry = lod::find(name).expect("in the table");
@@ -40,13 +41,13 @@ fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[
         });
         sum[1] += times.fold(f64::INFINITY, f64::min);
         sum[0] += list.triangles() as f64;
-        let pages = strips.stats().into_iter().find(|figure| figure.0 == "visible pages");
-        sum[2] += pages.map_or(0.0, |figure| figure.1);
+        let pages = strips.stats().into_iter().find(|stat| stat.0 == "visible pages");
+        sum[2] += pages.map_or(0.0, |stat| stat.1);
     }
     sum.map(|sum| sum / views.len() as f64)
 }
 
-/// Slope, intercept and R² of the least squares line through points.
+/// Returns slope, intercept and R² of the least-squares line through points.
 fn line(points: &[[f64; 2]]) -> [f64; 3] {
     let mean = |f: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>() / points.len() as f64;
     let [x, y] = [mean(&|p| p[0]), mean(&|p| p[1])];
@@ -55,7 +56,7 @@ fn line(points: &[[f64; 2]]) -> [f64; 3] {
     [xy / xx, y - xy / xx * x, xy * xy / (xx * yy)]
 }
 
-/// Prints a series and returns what a triangle costs, seconds.
+/// Prints a series and returns the time per triangle, seconds.
 fn report(title: &str, points: &[[f64; 2]]) -> f64 {
     println!("{title}");
     for [triangles, seconds] in points {
@@ -66,7 +67,7 @@ fn report(title: &str, points: &[[f64; 2]]) -> f64 {
     slope
 }
 
-/// The circle over land that is tiled `tiles` times along both axes.
+/// Returns a field tiled `tiles` times along both axes, and the circle over it.
 fn scene(tiles: u32) -> (Arc<Field>, Vec<View>) {
     let mut field = synth::synth(synth::Kind::Eroded, [512, 512], 7).tiled([tiles; 2]);
     field.spacing = [10.0, 10.0];
@@ -75,13 +76,14 @@ fn scene(tiles: u32) -> (Arc<Field>, Vec<View>) {
     (Arc::new(field), views)
 }
 
-/// The levels by distance, `page` cells along a side of a page.
+/// Settings for levels by distance, with pages of `page` cells along a side.
 fn uniform(edge_px: f64, page: u32) -> [(&'static str, String); 3] {
     [("level", "uniform".to_string()), ("edge", edge_px.to_string()), ("page", page.to_string())]
 }
 
-/// What a page costs beside its triangles, of which each costs `slope` seconds: the same land in pages of two sizes.
-fn cost_of_a_page((field, views): &(Arc<Field>, Vec<View>), slope: f64) {
+/// Prints the cost of a page beyond its triangles (`slope` seconds each), from the same terrain in pages of two
+/// sizes.
+fn page_cost((field, views): &(Arc<Field>, Vec<View>), slope: f64) {
     let [small, large] = [16, 64].map(|page| series(field, "sorted-strips:serial", &uniform(400.0, page), views));
     let [triangles, seconds, pages] = [0, 1, 2].map(|k| small[k] - large[k]);
     println!(
@@ -92,8 +94,8 @@ fn cost_of_a_page((field, views): &(Arc<Field>, Vec<View>), slope: f64) {
     );
 }
 
-/// How much faster two cores are here at best: two walks that know nothing of each other, side by side, against one.
-fn two_at_once((field, views): &(Arc<Field>, Vec<View>)) {
+/// Prints the speed-up of two independent walks on two threads against one: an upper bound for parallel walks.
+fn two_walks_in_parallel((field, views): &(Arc<Field>, Vec<View>)) {
     for edge_px in [25.0, 6.0, 2.5] {
         let walk = || series(field, "sorted-strips:serial", &uniform(edge_px, 64), views);
         let [triangles, alone, _] = walk();
@@ -118,8 +120,8 @@ fn main() {
     for (serial, parallel) in serial.iter().zip(parallel) {
         println!("{:10.0} triangles: parallel {:.2} times as fast", serial[0], serial[1] / parallel[1]);
     }
-    two_at_once(&wide);
-    cost_of_a_page(&wide, *slope);
+    two_walks_in_parallel(&wide);
+    page_cost(&wide, *slope);
     let at = |px: f64| {
         let of_px = |view: &View| View { tolerance: Tolerance { px, ..view.tolerance }, ..*view };
         let views: Vec<_> = wide.1.iter().map(of_px).collect();

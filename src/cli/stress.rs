@@ -8,7 +8,9 @@ use indicatif::ProgressBar;
 
 use super::{Common, Outcome, interrupt, report};
 use crate::height::save::replace;
-use crate::stress::{self, Case, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, Trial, jitter, rows, saved, stiff};
+use crate::stress::{
+    self, Case, CaseRun, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, jitter, rows, saved, stiff,
+};
 
 /// Where counter-examples go if nothing else is said.
 const FOLDER: &str = "cuesta-stress";
@@ -43,14 +45,14 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
         cases.iter().try_for_each(|case| report::say(format_args!("{}: {}", case.family, case.name)))?;
         return Ok(Outcome::Done);
     }
-    let mut trials = stress::trials(&cases, &args.technique).map_err(anyhow::Error::msg)?;
+    let mut trials = stress::case_runs(&cases, &args.technique).map_err(anyhow::Error::msg)?;
     if !args.technique.is_empty() {
-        trials.retain(|trial| !matches!(trial.case.kind, Kind::Alone(..)) || !args.family.is_empty());
+        trials.retain(|trial| !matches!(trial.case.kind, Kind::Standalone(..)) || !args.family.is_empty());
     }
     let mut device = Device::open(common, args)?;
-    let bar = progress(common, &trials, device.eye().is_some());
+    let bar = progress(common, &trials, device.checker().is_some());
     let stop = interrupt::flag();
-    let found = stress::run(&trials, device.eye(), &stop, |trial| {
+    let found = stress::run(&trials, device.checker(), &stop, |trial| {
         bar.set_message(format!("{}: {}, {}", trial.case.family, trial.case.name, trial.technique()));
         bar.inc(1);
     });
@@ -59,7 +61,7 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
     let mut rows = Vec::new();
     for (trial, findings) in trials.iter().zip(&found.findings) {
         for finding in findings {
-            rows.push(row(common, &folder, trial, finding, device.eye()));
+            rows.push(row(common, &folder, trial, finding, device.checker()));
         }
     }
     let (name, messages) = device.close();
@@ -93,17 +95,23 @@ fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
     Ok(cases)
 }
 
-fn progress(common: &Common, trials: &[Trial], draws: bool) -> ProgressBar {
+fn progress(common: &Common, trials: &[CaseRun], draws: bool) -> ProgressBar {
     let drawn = trials.iter().filter(|trial| draws && trial.is_drawn()).count();
     let bar = if common.quiet || common.json { ProgressBar::hidden() } else { ProgressBar::no_length() };
     bar.set_length((trials.len() + drawn) as u64);
     bar
 }
 
-fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Option<&mut dyn ImageChecker>) -> Row {
+fn row(
+    common: &Common,
+    folder: &Path,
+    trial: &CaseRun,
+    finding: &Finding,
+    checker: Option<&mut dyn ImageChecker>,
+) -> Row {
     let finite = |value: f64| value.is_finite().then_some(value);
     // A row is worth more than its counter-example.
-    let files = counter_example(folder, trial, finding, eye).unwrap_or_else(|error| {
+    let files = counter_example(folder, trial, finding, checker).unwrap_or_else(|error| {
         report::warn(common, &format!("no counter-example: {error:#}"));
         Vec::new()
     });
@@ -123,15 +131,15 @@ fn row(common: &Common, folder: &Path, trial: &Trial, finding: &Finding, eye: Op
 
 fn counter_example(
     folder: &Path,
-    trial: &Trial,
+    trial: &CaseRun,
     finding: &Finding,
-    eye: Option<&mut dyn ImageChecker>,
+    checker: Option<&mut dyn ImageChecker>,
 ) -> Result<Vec<PathBuf>> {
     if finding.passes() {
         return Ok(Vec::new());
     }
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    saved::counter_example(folder, trial, finding, eye)
+    saved::counter_example(folder, trial, finding, checker)
 }
 
 fn validation(messages: &[String]) -> Row {
@@ -218,13 +226,13 @@ impl Device {
         }
     }
 
-    fn eye(&mut self) -> Option<&mut dyn ImageChecker> {
-        self.0.as_mut().map(|(_, eye)| eye as &mut dyn ImageChecker)
+    fn checker(&mut self) -> Option<&mut dyn ImageChecker> {
+        self.0.as_mut().map(|(_, checker)| checker as &mut dyn ImageChecker)
     }
 
     /// Its name, and validation messages.
     fn close(self) -> (Option<String>, Vec<String>) {
-        self.0.map_or((None, Vec::new()), |(name, eye)| (Some(name), eye.close()))
+        self.0.map_or((None, Vec::new()), |(name, checker)| (Some(name), checker.close()))
     }
 }
 
@@ -238,7 +246,7 @@ impl Device {
         Ok(Self)
     }
 
-    fn eye(&mut self) -> Option<&mut dyn ImageChecker> {
+    fn checker(&mut self) -> Option<&mut dyn ImageChecker> {
         None
     }
 

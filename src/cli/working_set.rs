@@ -11,9 +11,9 @@ use crate::draw::DrawList;
 use crate::height::{Error, Field};
 use crate::lod::Technique;
 use crate::texture::resolution::texture_area;
-use crate::texture::virtual_ground::{GroundSet, MAX_SLOTS, SLOT_LEVEL, VirtualGroundLayout};
+use crate::texture::virtual_ground::{GroundSet, MAX_SLOTS, TILE_LEVEL, VirtualGroundLayout};
 use crate::texture::wedges;
-use crate::texture::working_set::{Node, WorkingSet};
+use crate::texture::working_set::{TileId, WorkingSet};
 use crate::view::View;
 
 /// Side of the picture, pixels.
@@ -58,12 +58,12 @@ pub fn draw(
     let cut = VirtualGroundLayout::new(field, texture_bytes, MAX_SLOTS as u32).map_err(anyhow::Error::msg)?;
     let mut list = DrawList::default();
     technique.select(view, &mut list);
-    let wedges = wedges::of_list(field, view, technique.resident(), &list);
+    let wedges = wedges::from_draw_list(field, view, technique.resident(), &list);
     let mut needed = GroundSet::new(cut);
-    needed.show(view, &wedges);
+    needed.update(view, &wedges);
     let set = needed.set();
     let mut levels = Vec::new();
-    for (node, _) in set.nodes() {
+    for (node, _) in set.tiles() {
         levels.resize(levels.len().max(node.level as usize + 1), 0);
         levels[node.level as usize] += 1;
     }
@@ -71,11 +71,11 @@ pub fn draw(
     save(path, &picture(set, &window, levels.len()))?;
     let root = f64::from(wedges::root_side(field));
     Ok(Needed {
-        map_texels: texture_area(cut.map_level()),
+        map_texels: texture_area(cut.texture_level()),
         wedges: wedges.len(),
-        nodes: set.nodes().count(),
+        nodes: set.tiles().count(),
         slots: cut.slots,
-        bytes: set.nodes().count() as u64 * VirtualGroundLayout::tile_bytes(),
+        bytes: set.tiles().count() as u64 * VirtualGroundLayout::tile_bytes(),
         texel_px: needed.texel_px(),
         texels: set.texels(),
         texels_a_pixel: set.texels() / f64::from(view.size[0]) / f64::from(view.size[1]),
@@ -86,9 +86,9 @@ pub fn draw(
 
 impl Window {
     fn around(set: &WorkingSet) -> Self {
-        let side = |node: &Node| 0.5f64.powi(node.level as i32);
+        let side = |node: &TileId| 0.5f64.powi(node.level as i32);
         let ends = |k: usize| {
-            let nodes = set.nodes().map(|(node, _)| node).filter(|node| node.level > 0);
+            let nodes = set.tiles().map(|(node, _)| node).filter(|node| node.level > 0);
             nodes.fold([1.0f64, 0.0f64], |[low, high], node| {
                 let first = f64::from(node.at[k]) * side(&node);
                 [low.min(first), high.max(first + side(&node))]
@@ -114,7 +114,7 @@ fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
         let at = window.at(x, y);
         let is_on_map = at.iter().all(|part| (0.0..1.0).contains(part));
         let of_level = |level: u32| {
-            let node = Node { level, at: at.map(|part| (part * f64::from(1u32 << level)) as u32) };
+            let node = TileId { level, at: at.map(|part| (part * f64::from(1u32 << level)) as u32) };
             Some((node, set.resolution(node)?))
         };
         // The finest there is: others lie below it.
@@ -123,14 +123,14 @@ fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
     })
 }
 
-fn colour(node: Node, resolution: u32, at: [f64; 2], pixel_side: f64) -> Rgba<u8> {
+fn colour(node: TileId, resolution: u32, at: [f64; 2], pixel_side: f64) -> Rgba<u8> {
     let side = 0.5f64.powi(node.level as i32);
     // A line of a pixel around each node that is large enough for it.
     let is_edge = (0..2).any(|k| at[k] / side - f64::from(node.at[k]) < pixel_side / side) && side > 5.0 * pixel_side;
     if is_edge {
         return Rgba([0, 0, 0, 255]);
     }
-    let light = 0.4 + 0.6 * f64::from(resolution + 1) / f64::from(SLOT_LEVEL + 1);
+    let light = 0.4 + 0.6 * f64::from(resolution + 1) / f64::from(TILE_LEVEL + 1);
     let hue = (f64::from(node.level) * 0.618_034).fract() * 6.0;
     let part = |shift: f64| (((hue + shift) % 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
     let [r, g, b] = [0.0, 4.0, 2.0].map(|shift| (255.0 * light * (0.25 + 0.75 * part(shift))) as u8);

@@ -1,4 +1,4 @@
-//! The device's clock on the host's, so that both stand on one line of time.
+//! Converts device timestamps to the host's time line.
 
 use std::time::Instant;
 
@@ -8,36 +8,36 @@ use ash::{ext, vk};
 use super::device::Gpu;
 use super::instance::Instance;
 
-/// Readings of both clocks; the one that took the least time counts.
+/// Number of simultaneous readings of both clocks; the one with the smallest deviation is used.
 const READINGS: usize = 8;
 
-/// A moment on both clocks.
+/// A pair of simultaneous device and host times, from which device ticks convert to microseconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     /// Device ticks.
     ticks: u64,
-    /// Microseconds after the origin at those ticks.
+    /// Host time at those ticks, microseconds after the origin.
     us: f64,
-    /// The origin.
+    /// Origin of the time line.
     origin: Instant,
-    /// Microseconds by which a time may be shifted.
+    /// Maximum error of a converted time, microseconds.
     pub deviation_us: f64,
-    /// Whether the driver read its clock while the host did; else it lies where the submission and the end of the
-    /// work allow.
+    /// True if the driver read both clocks together (`VK_EXT_calibrated_timestamps`). False if the times were aligned
+    /// by the submission and the end of the work.
     pub is_calibrated: bool,
     unit: Unit,
 }
 
-/// What a tick is.
+/// Unit and width of device ticks.
 #[derive(Clone, Copy, Debug)]
 struct Unit {
-    /// Microseconds.
+    /// Microseconds per tick.
     us: f64,
-    /// Valid bits of a count.
+    /// Valid bits of a timestamp.
     bits: u32,
 }
 
-/// `VK_EXT_calibrated_timestamps`, where the driver has it and reads the clock of timestamps with it.
+/// Returns true if the driver has `VK_EXT_calibrated_timestamps` and supports the device time domain with it.
 pub(super) fn is_readable(instance: &Instance, device: vk::PhysicalDevice) -> bool {
     // SAFETY: the device is of this instance.
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(device) }.unwrap_or_default();
@@ -52,13 +52,13 @@ pub(super) fn is_readable(instance: &Instance, device: vk::PhysicalDevice) -> bo
 }
 
 impl Clock {
-    /// Reads the device's clock between two readings of the host's; `None` where the driver has no way to.
+    /// Reads the device clock between two readings of the host clock; `None` if the driver does not support it.
     pub fn calibrated(gpu: &Gpu, origin: Instant) -> Result<Option<Self>> {
         let Some(reader) = &gpu.clock else { return Ok(None) };
         let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
         let read = || -> Result<Self> {
             let before = us(origin, Instant::now());
-            // SAFETY: the device has this time domain: the reader exists only then.
+            // SAFETY: the reader exists only if the device supports this time domain.
             let (ticks, _) =
                 unsafe { reader.get_calibrated_timestamps(&domain) }.context("reading the device clock")?;
             let after = us(origin, Instant::now());
@@ -72,8 +72,8 @@ impl Clock {
         Ok(Some(best))
     }
 
-    /// From work that the host submitted and saw finished at these instants and whose first and last ticks are
-    /// these: the middle of what they allow.
+    /// Aligns the clocks by work with known first and last ticks that the host submitted and saw finished at the
+    /// given instants. The result is the middle of the possible interval.
     pub fn aligned(gpu: &Gpu, origin: Instant, ticks: [u64; 2], instants: [Instant; 2]) -> Self {
         Self::enclosed(Unit::of(gpu), origin, ticks, instants)
     }
@@ -83,20 +83,20 @@ impl Clock {
         Self::within(unit, origin, first, [us(origin, submitted), us(origin, finished) - length], false)
     }
 
-    /// The ticks fell between these two times.
+    /// Returns a clock at which `ticks` fell in the interval from `from` to `to`, microseconds.
     fn within(unit: Unit, origin: Instant, ticks: u64, [from, to]: [f64; 2], is_calibrated: bool) -> Self {
         Self { ticks, us: (from + to) / 2.0, origin, deviation_us: (to - from).abs() / 2.0, is_calibrated, unit }
     }
 
-    /// Microseconds from the origin to these ticks.
+    /// Converts device ticks to microseconds after the origin. Ticks may wrap around.
     pub fn us(&self, ticks: u64) -> f64 {
-        // The sign of the difference is that of its highest valid bit.
+        // Sign-extends the difference from its highest valid bit.
         let unused = 64 - self.unit.bits;
         let difference = (ticks.wrapping_sub(self.ticks) << unused) as i64 >> unused;
         self.us + difference as f64 * self.unit.us
     }
 
-    /// Microseconds from the origin to an instant of the host.
+    /// Converts a host instant to microseconds after the origin.
     pub fn host_us(&self, at: Instant) -> f64 {
         us(self.origin, at)
     }
@@ -108,7 +108,7 @@ impl Unit {
     }
 }
 
-/// Signed microseconds.
+/// Returns the signed microseconds from `origin` to `at`.
 fn us(origin: Instant, at: Instant) -> f64 {
     1e6 * (at.saturating_duration_since(origin).as_secs_f64() - origin.saturating_duration_since(at).as_secs_f64())
 }
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_go_both_ways_and_wrap() {
+    fn ticks_before_and_after_wraparound_convert() {
         let clock = Clock {
             ticks: (1 << 36) - 10,
             us: 1000.0,
@@ -135,16 +135,16 @@ mod tests {
     }
 
     #[test]
-    fn the_host_counts_before_and_after_the_origin() {
+    fn host_times_before_the_origin_are_negative() {
         let origin = Instant::now();
         let later = origin + std::time::Duration::from_micros(250);
         assert!((us(origin, later) - 250.0).abs() < 1e-6);
         assert!((us(later, origin) + 250.0).abs() < 1e-6);
     }
 
-    /// 2 ms of work between a submission at 0.5 ms and its end at 4.5 ms began between 0.5 and 2.5 ms.
+    /// 2 ms of work, submitted at 0.5 ms and finished at 4.5 ms, must have begun between 0.5 and 2.5 ms.
     #[test]
-    fn uncalibrated_work_lies_in_the_middle_of_what_its_submission_and_end_allow() {
+    fn uncalibrated_work_is_centred_between_its_submission_and_end() {
         let origin = Instant::now();
         let at = |us| origin + std::time::Duration::from_micros(us);
         let clock = Clock::enclosed(Unit { us: 2.0, bits: 64 }, origin, [7000, 8000], [at(500), at(4500)]);

@@ -1,10 +1,10 @@
-//! An array of texture slots of one size that frames fill while they are drawn, with the maps of a picture in it or the
-//! texels of the ground.
+//! The GPU side of virtual textures: a tile cache in an image array, filled while frames are drawn, and the page
+//! tables.
 //!
-//! A slot is a layer of one array image, bound by a plain descriptor. A frame copies at most so many bytes into slots, from
-//! staging of its own, before it draws; the barrier before the copies waits for the frames that still read. Whoever
-//! chooses the slots ([`VirtualOverlay`], [`VirtualGround`]) gives none away that served in the frame before, so that with two frames in flight
-//! nothing that is read is overwritten.
+//! A cache slot is a layer of one array image, bound by a plain descriptor. Before a frame draws, it copies a limited
+//! number of bytes from its own staging buffer into slots. The barrier before the copies waits for frames that still
+//! read. [`VirtualOverlay`] and [`VirtualGround`] choose the slots; they never reassign a slot used in the previous
+//! frame. With two frames in flight, nothing that is read is overwritten.
 
 use std::sync::Arc;
 
@@ -19,36 +19,37 @@ use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
 use crate::plan::ScenePlan;
 use crate::texture::overlay_pyramid::Picture;
-use crate::texture::tile_cache::Fill;
+use crate::texture::tile_cache::TileUpload;
 use crate::texture::virtual_ground::{VirtualGround, VirtualGroundLayout};
 use crate::texture::virtual_overlay::VirtualOverlay;
 pub use crate::texture::virtual_overlay::VirtualTextureStats;
 use crate::view::View;
 
-/// The most bytes that a frame copies into slots.
+/// Upper limit of bytes that a frame copies into slots (at least one tile).
 const FRAME_BYTES: u64 = 4 << 20;
-/// More rounds than any view takes to load: each brings one tile at least, and no table of slots has as many.
+/// Upper limit of rounds in which a view's tiles load. Each round loads at least one tile, and no cache has as many
+/// slots.
 const MAX_ROUNDS: u32 = 100_000;
 
-/// The slots.
+/// The cache slots and the staging buffers that fill them.
 pub struct GpuTileCache {
-    /// A layer a slot.
+    /// Array image with one layer per slot, sRGB.
     pub image: Image,
-    /// Linear within a slot.
+    /// Linear filtering, clamped to the edges of a slot.
     pub sampler: Sampler,
     tile_bytes: u64,
     staging: Vec<Buffer>,
 }
 
 impl GpuTileCache {
-    /// So many slots of `side` × `side` texels, in no defined state.
+    /// Creates `count` slots of `side` × `side` texels with undefined contents.
     pub fn new(gpu: &Arc<Gpu>, purpose: &'static str, side: u32, count: u32) -> Result<Self> {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let format = vk::Format::R8G8B8A8_SRGB;
         let image = Image::new(gpu, ImageInfo { purpose, size: [side; 2], layers: Some(count), format, usage })?;
         let tile_bytes = 4 * u64::from(side).pow(2);
-        let room = tile_bytes * (FRAME_BYTES / tile_bytes).clamp(1, u64::from(count));
-        let staging = |_| Buffer::host(gpu, "texture staging", room, vk::BufferUsageFlags::TRANSFER_SRC);
+        let staging_bytes = tile_bytes * (FRAME_BYTES / tile_bytes).clamp(1, u64::from(count));
+        let staging = |_| Buffer::host(gpu, "texture staging", staging_bytes, vk::BufferUsageFlags::TRANSFER_SRC);
         let slots = Self {
             image,
             sampler: height_pages::sampler(gpu, Sampling::Clamped)?,
@@ -63,26 +64,26 @@ impl GpuTileCache {
         Ok(slots)
     }
 
-    /// The most slots that a frame fills.
-    pub fn max_fills(&self) -> usize {
+    /// Returns the maximum number of tiles that a frame uploads.
+    pub fn max_uploads(&self) -> usize {
         (self.staging[0].size / self.tile_bytes) as usize
     }
 
-    /// Records the filling of slots: before the target begins.
+    /// Records the upload of tiles into their slots. Must precede the beginning of rendering.
     ///
     /// # Panics
-    /// If there are more than [`Self::max_fills`], or texels of another size.
-    pub fn fill(&mut self, recording: &mut Recording, fills: &[Fill]) -> Result<()> {
-        if fills.is_empty() {
+    /// If there are more than [`Self::max_uploads`] tiles, or if a tile has another size.
+    pub fn upload(&mut self, recording: &mut Recording, uploads: &[TileUpload]) -> Result<()> {
+        if uploads.is_empty() {
             return Ok(());
         }
         let staging = &mut self.staging[recording.slot];
-        for (k, fill) in fills.iter().enumerate() {
-            assert_eq!(size_of_val(fill.texels.as_slice()) as u64, self.tile_bytes, "a tile's texels");
-            staging.write(k * self.tile_bytes as usize, bytemuck::cast_slice(&fill.texels));
+        for (k, upload) in uploads.iter().enumerate() {
+            assert_eq!(size_of_val(upload.texels.as_slice()) as u64, self.tile_bytes, "bytes of a tile");
+            staging.write(k * self.tile_bytes as usize, bytemuck::cast_slice(&upload.texels));
         }
         let regions: Vec<_> =
-            (0u64..).zip(fills).map(|(k, fill)| self.region(k * self.tile_bytes, fill.slot)).collect();
+            (0u64..).zip(uploads).map(|(k, upload)| self.region(k * self.tile_bytes, upload.slot)).collect();
         let (image, staging) = (&self.image, self.staging[recording.slot].raw);
         recording.scope("textures", |r| {
             barriers(r.gpu, r.commands, &[image.barrier(READ, WRITTEN)]);
@@ -104,57 +105,57 @@ impl GpuTileCache {
     }
 }
 
-/// As fragments read the image.
+/// Image state for sampling in fragment shaders.
 const READ: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
     vk::PipelineStageFlags2::FRAGMENT_SHADER,
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
-/// As copies write it.
+/// Image state for copies.
 const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
 
-/// The texels laid over a scene in parts: those of a picture, or of the ground; without either stand-ins.
+/// The virtual texture of a scene: an overlay image, generated ground, or a one-texel placeholder.
 pub struct Overlay {
-    /// The slots.
+    /// The tile cache.
     pub slots: GpuTileCache,
-    /// In which a fragment finds its part, one table a frame in flight.
+    /// Page tables, one per frame in flight.
     pub tables: Vec<Buffer>,
-    parts: Parts,
+    texture: VirtualTexture,
 }
 
-/// Whose texels they are.
-enum Parts {
+/// Source of the texels.
+enum VirtualTexture {
     None,
     Picture(Box<VirtualOverlay>),
     Ground(Box<VirtualGround>),
 }
 
 impl Overlay {
-    /// What the plan says of the picture and the ground.
+    /// Creates the virtual texture that a scene plan lists.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
         field: &Arc<Field>,
         picture: Option<&image::RgbaImage>,
     ) -> Result<Self> {
-        let parts = match (plan.ground, plan.maps.zip(picture)) {
-            (Some(layout), _) => Parts::Ground(Box::new(VirtualGround::new(field, layout))),
+        let texture = match (plan.ground, plan.maps.zip(picture)) {
+            (Some(layout), _) => VirtualTexture::Ground(Box::new(VirtualGround::new(field, layout))),
             (None, Some((layout, picture))) => {
                 let texels = bytemuck::cast_slice(picture.as_raw());
                 let picture = Picture { size: picture.dimensions().into(), texels };
-                Parts::Picture(Box::new(VirtualOverlay::new(field, layout, plan.drape, picture)))
+                VirtualTexture::Picture(Box::new(VirtualOverlay::new(field, layout, plan.drape, picture)))
             }
-            (None, None) => Parts::None,
+            (None, None) => VirtualTexture::None,
         };
-        let (slots, words) = match &parts {
-            Parts::None => (GpuTileCache::new(gpu, "no texture maps", 1, 1)?, 1),
-            Parts::Picture(maps) => {
-                let layout = maps.layout();
-                (GpuTileCache::new(gpu, "texture maps", layout.cells + 1, layout.slots)?, maps.table().len())
+        let (slots, words) = match &texture {
+            VirtualTexture::None => (GpuTileCache::new(gpu, "no texture maps", 1, 1)?, 1),
+            VirtualTexture::Picture(texture) => {
+                let layout = texture.layout();
+                (GpuTileCache::new(gpu, "texture maps", layout.cells + 1, layout.slots)?, texture.table().len())
             }
-            Parts::Ground(maps) => {
-                let layout = maps.layout();
+            VirtualTexture::Ground(texture) => {
+                let layout = texture.layout();
                 (
                     GpuTileCache::new(gpu, "ground texels", VirtualGroundLayout::tile_side(), layout.slots)?,
                     layout.table_words(),
@@ -162,80 +163,81 @@ impl Overlay {
             }
         };
         let table = |_| Buffer::host(gpu, "texture table", 4 * words as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, parts };
-        // Everything by the root.
-        if let Some(table) = overlay.parts.table() {
+        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, texture };
+        // All pages start with the root tile.
+        if let Some(table) = overlay.texture.table() {
             overlay.tables.iter_mut().for_each(|buffer| buffer.write(0, bytemuck::cast_slice(table)));
         }
         Ok(overlay)
     }
 
-    /// Whether it is what a plan says.
+    /// Returns true if this is the virtual texture of a plan, so that it can be kept.
     pub fn serves(&self, plan: &ScenePlan) -> bool {
-        match &self.parts {
-            Parts::None => plan.ground.is_none() && plan.maps.is_none(),
-            Parts::Picture(maps) => plan.ground.is_none() && plan.maps == Some(*maps.layout()),
-            Parts::Ground(maps) => plan.ground == Some(*maps.layout()),
+        match &self.texture {
+            VirtualTexture::None => plan.ground.is_none() && plan.maps.is_none(),
+            VirtualTexture::Picture(texture) => plan.ground.is_none() && plan.maps == Some(*texture.layout()),
+            VirtualTexture::Ground(texture) => plan.ground == Some(*texture.layout()),
         }
     }
 
-    /// Is told of a list that is to be drawn: its triangles say which texels of the ground are needed.
+    /// Passes the draw list of the next frame on: its triangles determine the ground tiles needed.
     pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
-        if let Parts::Ground(maps) = &mut self.parts {
-            maps.see(view, resident, list);
+        if let VirtualTexture::Ground(texture) = &mut self.texture {
+            texture.require(view, resident, list);
         }
     }
 
-    /// Chooses the parts for a view, fills what was made meanwhile, and writes the frame's table: before the target begins.
+    /// Chooses tiles for a view, records uploads of generated ones and writes the frame's page table. Must precede
+    /// the beginning of rendering.
     pub fn look(&mut self, recording: &mut Recording, view: &View) -> Result<()> {
-        let max = self.slots.max_fills();
-        let fills = match &mut self.parts {
-            Parts::None => return Ok(()),
-            Parts::Picture(maps) => maps.look(view, max),
-            Parts::Ground(maps) => maps.look(max),
+        let max = self.slots.max_uploads();
+        let uploads = match &mut self.texture {
+            VirtualTexture::None => return Ok(()),
+            VirtualTexture::Picture(texture) => texture.update(view, max),
+            VirtualTexture::Ground(texture) => texture.update(max),
         };
-        self.slots.fill(recording, &fills)?;
-        if let Some(table) = self.parts.table() {
+        self.slots.upload(recording, &uploads)?;
+        if let Some(table) = self.texture.table() {
             self.tables[recording.slot].write(0, bytemuck::cast_slice(table));
         }
         Ok(())
     }
 
-    /// Loads all that a view needs of the list seen last. Nothing may be under way on the device.
+    /// Loads all tiles that a view and the last draw list need. The GPU must be idle.
     ///
     /// # Errors
-    /// If something is still missing after `MAX_ROUNDS` rounds.
+    /// If tiles are still missing after `MAX_ROUNDS` rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         for _ in 0..MAX_ROUNDS {
             once(gpu, |r| self.look(r, view))?;
             if self.stats().is_none_or(|stats| stats.pending == 0) {
                 return Ok(());
             }
-            match &mut self.parts {
-                Parts::None => {}
-                Parts::Picture(maps) => maps.wait(),
-                Parts::Ground(maps) => maps.wait(),
+            match &mut self.texture {
+                VirtualTexture::None => {}
+                VirtualTexture::Picture(texture) => texture.wait(),
+                VirtualTexture::Ground(texture) => texture.wait(),
             }
         }
-        bail!("textures of the view are still missing after {MAX_ROUNDS} rounds")
+        bail!("virtual-texture tiles of the view are still missing after {MAX_ROUNDS} rounds")
     }
 
-    /// What is held, if something is there in parts.
+    /// Returns the cache statistics; `None` without a virtual texture.
     pub fn stats(&self) -> Option<VirtualTextureStats> {
-        match &self.parts {
-            Parts::None => None,
-            Parts::Picture(maps) => Some(maps.stats()),
-            Parts::Ground(maps) => Some(maps.stats()),
+        match &self.texture {
+            VirtualTexture::None => None,
+            VirtualTexture::Picture(texture) => Some(texture.stats()),
+            VirtualTexture::Ground(texture) => Some(texture.stats()),
         }
     }
 }
 
-impl Parts {
+impl VirtualTexture {
     fn table(&self) -> Option<&[u32]> {
         match self {
-            Parts::None => None,
-            Parts::Picture(maps) => Some(maps.table()),
-            Parts::Ground(maps) => Some(maps.table().words()),
+            VirtualTexture::None => None,
+            VirtualTexture::Picture(texture) => Some(texture.table()),
+            VirtualTexture::Ground(texture) => Some(texture.table().words()),
         }
     }
 }

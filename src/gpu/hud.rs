@@ -1,4 +1,4 @@
-//! Draws what egui lays out over a frame.
+//! Draws the egui overlay (HUD) over a frame.
 
 use std::sync::Arc;
 
@@ -13,24 +13,24 @@ use super::frames::{Recording, SLOTS};
 use super::memory::{Buffer, Image, ImageInfo};
 use super::target::Formats;
 
-/// Vertices that each slot has room for from the start: the help overlay takes about a third.
+/// Vertices reserved for each frame in flight; the help overlay takes about a third.
 const VERTICES: usize = 32 << 10;
 
-/// egui's renderer and what it needs.
+/// egui's Vulkan renderer with its command pool.
 pub struct Hud {
-    renderer: Renderer<Accounted>,
+    renderer: Renderer<TrackedAllocator>,
     pool: vk::CommandPool,
     gpu: Arc<Gpu>,
     is_reserved: bool,
 }
 
 impl Hud {
-    /// Draws to attachments of these formats.
+    /// Creates a renderer for attachments of the given formats.
     pub fn new(gpu: &Arc<Gpu>, formats: Formats) -> Result<Self> {
         let mode = mode(formats);
         let is_srgb = format!("{:?}", formats.colour).contains("SRGB");
         let options = Options { in_flight_frames: SLOTS, srgb_framebuffer: is_srgb, ..Default::default() };
-        let renderer = Renderer::with_allocator(Accounted(Arc::clone(gpu)), gpu.raw.clone(), mode, options)
+        let renderer = Renderer::with_allocator(TrackedAllocator(Arc::clone(gpu)), gpu.raw.clone(), mode, options)
             .context("the overlay's pipeline")?;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);
         // SAFETY: the device is alive; Drop destroys the pool.
@@ -38,13 +38,13 @@ impl Hud {
         Ok(Self { renderer, pool, gpu: Arc::clone(gpu), is_reserved: false })
     }
 
-    /// Draws from now on to attachments of these formats. It waits for the device.
+    /// Changes the attachment formats. Waits until the device is idle.
     pub fn reformat(&mut self, formats: Formats) -> Result<()> {
         self.gpu.wait_idle()?;
         self.renderer.set_render_mode(mode(formats)).context("the overlay's pipeline")
     }
 
-    /// Takes over changed textures, between frames. It waits for the device: textures in use change.
+    /// Applies texture changes between frames. Waits until the device is idle, since textures in use may change.
     pub fn update(&mut self, mut textures: egui::TexturesDelta) -> Result<()> {
         if textures.is_empty() {
             return Ok(());
@@ -58,7 +58,7 @@ impl Hud {
         textures.free.drain().try_for_each(|id| self.renderer.free_texture(id)).context("the overlay's font")
     }
 
-    /// Records the overlay: between the target's begin and end, last.
+    /// Records the overlay. Must be the last draw of a frame, while rendering is active.
     pub fn draw(
         &mut self,
         recording: &mut Recording,
@@ -70,7 +70,7 @@ impl Hud {
             return Ok(());
         }
         if !std::mem::replace(&mut self.is_reserved, true) {
-            primitives.push(room(primitives));
+            primitives.push(reserving_mesh(primitives));
         }
         let extent = vk::Extent2D { width, height };
         recording.scope("hud", |r| {
@@ -89,7 +89,7 @@ fn mode(formats: Formats) -> RenderMode {
 
 impl Drop for Hud {
     fn drop(&mut self) {
-        // SAFETY: nothing is in use once the device is idle; the renderer goes after this.
+        // SAFETY: the device is idle, so nothing is in use. The renderer is dropped after this.
         unsafe {
             let _ = self.gpu.raw.device_wait_idle();
             self.gpu.raw.destroy_command_pool(self.pool, None);
@@ -97,9 +97,9 @@ impl Drop for Hud {
     }
 }
 
-/// An invisible mesh that makes the renderer's buffers, sized by the first frame, as large as they may need
-/// to be: later frames make nothing.
-fn room(primitives: &[ClippedPrimitive]) -> ClippedPrimitive {
+/// Returns an invisible mesh that makes egui's renderer allocate its buffers at full size in the first frame, so that
+/// no later frame allocates.
+fn reserving_mesh(primitives: &[ClippedPrimitive]) -> ClippedPrimitive {
     let texture_id = primitives.iter().find_map(|p| match &p.primitive {
         Primitive::Mesh(mesh) => Some(mesh.texture_id),
         Primitive::Callback(_) => None,
@@ -112,8 +112,8 @@ fn room(primitives: &[ClippedPrimitive]) -> ClippedPrimitive {
     ClippedPrimitive { clip_rect: egui::Rect::ZERO, primitive: Primitive::Mesh(mesh) }
 }
 
-/// Gives the renderer buffers and images of our own kind: named, and counted among the device's bytes.
-struct Accounted(Arc<Gpu>);
+/// An allocator whose buffers and images are named and counted in the device's memory statistics.
+struct TrackedAllocator(Arc<Gpu>);
 
 /// A buffer or an image.
 enum Resource {
@@ -121,11 +121,11 @@ enum Resource {
     Image(#[allow(dead_code, reason = "held for its drop")] Image),
 }
 
-fn refused(error: anyhow::Error) -> RendererError {
+fn allocator_error(error: anyhow::Error) -> RendererError {
     RendererError::Allocator(format!("{error:#}"))
 }
 
-impl Allocator for Accounted {
+impl Allocator for TrackedAllocator {
     type Allocation = Resource;
 
     fn create_buffer(
@@ -134,7 +134,7 @@ impl Allocator for Accounted {
         size: usize,
         usage: vk::BufferUsageFlags,
     ) -> RendererResult<(vk::Buffer, Resource)> {
-        let buffer = Buffer::host(&self.0, "hud", size as u64, usage).map_err(refused)?;
+        let buffer = Buffer::host(&self.0, "hud", size as u64, usage).map_err(allocator_error)?;
         Ok((buffer.raw, Resource::Buffer(buffer)))
     }
 
@@ -142,7 +142,7 @@ impl Allocator for Accounted {
         let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED;
         let format = vk::Format::R8G8B8A8_SRGB;
         let info = ImageInfo { purpose: "hud", size: [width, height], layers: None, format, usage };
-        let image = Image::new(&self.0, info).map_err(refused)?;
+        let image = Image::new(&self.0, info).map_err(allocator_error)?;
         Ok((image.raw, Resource::Image(image)))
     }
 

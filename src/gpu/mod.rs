@@ -1,7 +1,7 @@
-//! Executes draw lists on Vulkan: the only module that names `ash` or says `unsafe`.
+//! Executes draw lists on Vulkan. The only module that uses `ash` or `unsafe`.
 //!
-//! It cannot tell which technique it draws. Offscreen pictures and windows are two targets with the same two
-//! steps. Everything is made at start; nothing is created inside a frame.
+//! The module does not depend on the technique that produced a list. Offscreen images and windows are two targets
+//! with the same two steps. All resources are created at start or on a change of scene; none inside a frame.
 #![allow(unsafe_code)]
 
 mod bindings;

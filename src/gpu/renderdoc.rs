@@ -1,7 +1,7 @@
-//! RenderDoc's in-application API, where its library is already in the process: captures of single frames.
+//! RenderDoc's in-application API: captures single frames if its library is already loaded in the process.
 //!
-//! After RenderDoc, "In-application API" (documentation of version 1.x): `RENDERDOC_GetAPI` hands out a table of
-//! functions that later versions only append to.
+//! After RenderDoc, "In-application API" (documentation of version 1.x). `RENDERDOC_GetAPI` returns a table of
+//! functions, to which later versions only append.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;
@@ -18,33 +18,33 @@ type EndFrameCapture = unsafe extern "C" fn(device: *mut c_void, window: *mut c_
 type GetNumCaptures = unsafe extern "C" fn() -> u32;
 type GetCapture = unsafe extern "C" fn(k: u32, path: *mut c_char, length: *mut u32, time: *mut u64) -> u32;
 
-/// The table of version 1.0.0, of which four functions are called.
+/// The function table of API version 1.0.0; four of its functions are called.
 #[repr(C)]
 struct Table {
-    /// Version, options, keys, overlay, shutting down, the file path template: none is called.
+    /// Version, options, keys, overlay, shutdown and file path template; unused.
     _before: [Function; 13],
     get_num_captures: GetNumCaptures,
     get_capture: GetCapture,
-    /// Triggering a capture, the replay program, the active window: none is called.
+    /// Trigger, replay program and active window; unused.
     _between: [Function; 4],
     start_frame_capture: StartFrameCapture,
     _is_frame_capturing: Function,
     end_frame_capture: EndFrameCapture,
 }
 
-/// The API of the library in this process.
+/// The API of the library loaded in this process.
 pub struct RenderDoc {
     table: &'static Table,
     _library: Library,
 }
 
 impl RenderDoc {
-    /// The library, if something — RenderDoc itself, as a rule — has loaded it.
+    /// Returns the API if the library is already loaded (usually by RenderDoc itself), otherwise `None`.
     pub fn loaded() -> Option<Self> {
         let library = library()?;
         let mut table: *const Table = std::ptr::null();
-        // SAFETY: the symbol has this type in every version; it fills in the table, which stays with the library,
-        // or says 0.
+        // SAFETY: the symbol has this type in every version. It returns 1 and a table that lives as long as the
+        // library, or 0.
         unsafe {
             let get_api: libloading::Symbol<unsafe extern "C" fn(c_int, *mut *const Table) -> c_int> =
                 library.get(b"RENDERDOC_GetAPI\0").ok()?;
@@ -55,23 +55,24 @@ impl RenderDoc {
         }
     }
 
-    /// Captures what is submitted within `frame`, and says to which file.
+    /// Captures everything submitted by `frame`. Returns its result and the capture's file.
     pub fn capture<T>(&self, frame: impl FnOnce() -> Result<T>) -> Result<(T, PathBuf)> {
         let any = std::ptr::null_mut();
         // SAFETY: null stands for any device and any window.
         unsafe { (self.table.start_frame_capture)(any, any) };
         let result = frame();
-        // SAFETY: as above; a capture is under way.
+        // SAFETY: as above; a capture has been started.
         if unsafe { (self.table.end_frame_capture)(any, any) } != 1 {
             bail!("RenderDoc took no capture: run under `renderdoccmd capture` or from its window");
         }
         Ok((result?, self.newest()))
     }
 
+    /// Returns the path of the latest capture.
     fn newest(&self) -> PathBuf {
         let mut path = [0 as c_char; 4096];
         let mut length = path.len() as u32;
-        // SAFETY: the buffer holds as many bytes as are said, and paths end with 0.
+        // SAFETY: the buffer has `length` bytes, and the path is NUL-terminated.
         unsafe {
             let last = (self.table.get_num_captures)().saturating_sub(1);
             (self.table.get_capture)(last, path.as_mut_ptr(), &mut length, std::ptr::null_mut());
@@ -84,7 +85,7 @@ impl RenderDoc {
 #[cfg(target_os = "linux")]
 fn library() -> Option<Library> {
     use libloading::os::unix;
-    /// Finds a library only where it is loaded already.
+    /// Returns a library only if it is already loaded.
     const RTLD_NOLOAD: c_int = 4;
     // SAFETY: nothing is loaded, so no initialiser runs.
     unsafe { unix::Library::open(Some("librenderdoc.so"), unix::RTLD_NOW | RTLD_NOLOAD) }.ok().map(Library::from)
@@ -95,7 +96,7 @@ fn library() -> Option<Library> {
     libloading::os::windows::Library::open_already_loaded("renderdoc.dll").ok().map(Library::from)
 }
 
-/// RenderDoc runs nowhere else.
+/// RenderDoc does not support other platforms.
 #[cfg(not(any(target_os = "linux", windows)))]
 fn library() -> Option<Library> {
     None
@@ -106,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_lies_as_documented() {
+    fn the_table_has_the_documented_offsets() {
         let place = |offset: usize| offset / size_of::<Function>();
         assert_eq!(place(std::mem::offset_of!(Table, get_num_captures)), 13);
         assert_eq!(place(std::mem::offset_of!(Table, get_capture)), 14);
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_not_loaded_by_looking_for_it() {
+    fn querying_does_not_load_the_library() {
         assert!(RenderDoc::loaded().is_none());
         assert!(RenderDoc::loaded().is_none(), "nor the second time");
     }

@@ -1,4 +1,4 @@
-//! A copy of one frame of the window, as it is shown.
+//! Copies the displayed image of one frame to host memory.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::target::Attachment;
 /// Stage, access and layout of an image.
 type Use = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
 
-/// Room for the copy.
+/// A host-visible buffer for one frame.
 pub struct Screenshot {
     buffer: Buffer,
     size: [u32; 2],
@@ -22,20 +22,20 @@ pub struct Screenshot {
 }
 
 impl Screenshot {
-    /// Room for a frame of this format and size.
+    /// Creates a buffer for a frame of this format and size in pixels. Fails if the format is not 8-bit RGBA or BGRA.
     pub fn new(gpu: &Arc<Gpu>, format: vk::Format, size: [u32; 2]) -> Result<Self> {
         use vk::Format as F;
         let is_bgra = match format {
             F::B8G8R8A8_SRGB | F::B8G8R8A8_UNORM => true,
             F::R8G8B8A8_SRGB | F::R8G8B8A8_UNORM | F::A8B8G8R8_SRGB_PACK32 | F::A8B8G8R8_UNORM_PACK32 => false,
-            _ => bail!("no screenshots of a window in {format:?}"),
+            _ => bail!("screenshots of a window in format {format:?} are not supported"),
         };
         let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         let (usage, location) = (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
         Ok(Self { buffer: Buffer::new(gpu, "screenshot", bytes, usage, location)?, size, is_bgra })
     }
 
-    /// Records the copy of an image last used as `last`; returns how it is used then.
+    /// Records the copy of an image whose last use was `last`. Returns the image's use after the copy.
     pub(super) fn record(&self, recording: &Recording, image: Attachment, last: Use) -> Use {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
         let (gpu, commands) = (recording.gpu, recording.commands);
@@ -54,16 +54,16 @@ impl Screenshot {
         copied
     }
 
-    /// The picture, once its frame has finished.
+    /// Returns the image. Call it once the frame has finished.
     ///
     /// # Panics
-    /// Never: there are as many bytes as pixels.
+    /// Never: the buffer always matches the size.
     pub fn picture(&self) -> image::RgbaImage {
         let [width, height] = self.size;
         let mut bytes = self.buffer.read()[..4 * width as usize * height as usize].to_vec();
         if self.is_bgra {
             bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
         }
-        image::RgbaImage::from_raw(width, height, bytes).expect("as many bytes as pixels")
+        image::RgbaImage::from_raw(width, height, bytes).expect("4 bytes per pixel")
     }
 }

@@ -88,7 +88,7 @@ impl Look {
     }
 
     fn textures(&self, field: &Field, render_origin: [i32; 2]) -> SurfaceTextures {
-        let overlay = self.drape_over(field).shares(render_origin);
+        let overlay = self.drape_over(field).uv_from_samples(render_origin);
         let repeats = |k: usize| Repeats::new(render_origin[k], field.spacing[k]);
         SurfaceTextures {
             detail_first: [0, 1].map(|k| repeats(k).first),

@@ -1,25 +1,24 @@
-//! Arithmetic: lists that are repeatable to the bit, and tolerances that only ever refine.
+//! Arithmetic: lists that are reproducible to the bit, and tolerances that refine monotonically.
 
 use std::sync::Arc;
 
 use super::fields::hills;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::invariants::{Subject, TOLERANCES_PX, Violation};
 use super::{Case, Finding, Kind, views};
 use crate::draw::DrawList;
 
-/// The family `arithmetic`. That lists of one view are the same, that numbers are numbers and that weights are in [0, 1]
-/// is a law or a check of every land.
+/// The family `arithmetic`. Determinism, finite numbers and weights in [0, 1] are checked on every terrain as well.
 pub const CASES: &[Case] = &[
-    Case { family: "arithmetic", name: "two of a kind", kind: Kind::Each(two_of_a_kind) },
-    Case { family: "arithmetic", name: "tolerances in steps of 1 %", kind: Kind::Each(fine_steps) },
+    Case { family: "arithmetic", name: "two instances of a technique", kind: Kind::PerTechnique(two_instances) },
+    Case { family: "arithmetic", name: "tolerances in steps of 1 %", kind: Kind::PerTechnique(fine_steps) },
 ];
 
-/// Two techniques made alike draw alike, byte for byte, frame by frame: nothing depends on threads, addresses or what was
-/// made before.
-fn two_of_a_kind(form: &Form) -> Vec<Finding> {
+/// Two instances of a technique must draw equal lists, byte for byte, in every frame: nothing may depend on threads,
+/// addresses or allocation history.
+fn two_instances(config: &TechniqueConfig) -> Vec<Finding> {
     let field = Arc::new(hills([129, 97], [10.0; 2], 400.0));
-    let mut both = [0, 1].map(|_| (form.entry.build)(Arc::clone(&field), &form.settings));
+    let mut both = [0, 1].map(|_| (config.entry.build)(Arc::clone(&field), &config.settings));
     let differs = views::views(&field).into_iter().find(|(_, view)| {
         let lists = both.each_mut().map(|technique| {
             let mut list = DrawList::default();
@@ -28,11 +27,11 @@ fn two_of_a_kind(form: &Form) -> Vec<Finding> {
         });
         lists[0] != lists[1]
     });
-    let violation = differs.map(|view| Violation::new(view, "two techniques made alike draw two lists"));
+    let violation = differs.map(|view| Violation::new(view, "two instances with equal settings draw different lists"));
     vec![Finding::holds("same frame twice, same bytes", violation.map_or(Ok(()), Err))]
 }
 
-/// All of a list that reaches the device.
+/// Returns all bytes of a list that reach the device.
 fn bytes(list: &DrawList) -> Vec<u8> {
     let draws = list.draws.iter().flat_map(|draw| {
         let words = [draw.indices.start, draw.indices.end, draw.instances.start, draw.instances.end, draw.first_vertex];
@@ -45,11 +44,11 @@ fn bytes(list: &DrawList) -> Vec<u8> {
     bytes
 }
 
-/// From 1/8 px to 16 px in steps of 1 %: a wider tolerance never draws more.
-fn fine_steps(form: &Form) -> Vec<Finding> {
+/// Raises the tolerance from 1/8 px to 16 px in steps of 1 %: a wider tolerance must never draw more triangles.
+fn fine_steps(config: &TechniqueConfig) -> Vec<Finding> {
     const STEPS: i32 = 490;
     let field = hills([129, 97], [10.0; 2], 400.0);
-    let mut technique = (form.entry.build)(Arc::new(field.clone()), &form.settings);
+    let mut technique = (config.entry.build)(Arc::new(field.clone()), &config.settings);
     let named = views::views(&field).swap_remove(2);
     let mut subject =
         Subject { field: &field, technique: &mut *technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };

@@ -1,11 +1,12 @@
-//! What a device draws in the suite: no sky through land, the triangles that the list says, the same bytes twice.
+//! Checks the images that a GPU draws: no sky through terrain, exactly the triangles of the list, and equal bytes for
+//! equal frames.
 
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 
 use super::invariants::Violation;
-use super::{Case, Finding, Flight, Form, ImageChecker, Kind, StressTerrain};
+use super::{Case, Finding, Flight, ImageChecker, Kind, StressTerrain, TechniqueConfig};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::Gpu;
@@ -16,20 +17,20 @@ use crate::scene::holes::Truth;
 use crate::scene::{Copy, Scene, SceneRenderer};
 use crate::view::View;
 
-/// Of a flight so many frames are drawn.
+/// Frames of a flight that are drawn.
 const FRAMES: usize = 8;
 
-/// Pictures are at most so many pixels wide and high: larger views are drawn smaller, with the same lens.
+/// Maximum width and height of an image, pixels. Larger views are drawn at this size with the same lens.
 const MAX_PX: u32 = 128;
 
-/// Looks through a device.
+/// An [`ImageChecker`] that draws with Vulkan.
 pub struct DeviceImageChecker {
     gpu: Arc<Gpu>,
     look: Look,
 }
 
-/// What was seen so far.
-struct Seen {
+/// Results of the views drawn so far.
+struct ImageResults {
     holes: usize,
     holes_at: Option<Violation>,
     drawn: Result<(), Violation>,
@@ -37,12 +38,12 @@ struct Seen {
 }
 
 impl DeviceImageChecker {
-    /// Through this one.
+    /// Creates a checker that draws with a device.
     pub fn new(gpu: Arc<Gpu>) -> Self {
         Self { gpu, look: Look::default() }
     }
 
-    /// Hands the device back; validation messages.
+    /// Closes the device and returns its validation messages.
     pub fn close(self) -> Vec<String> {
         Gpu::close(self.gpu)
     }
@@ -61,10 +62,15 @@ impl DeviceImageChecker {
         Scene { gpu: &self.gpu, field, plan, look: &self.look, overlay: None }
     }
 
-    /// Draws views in turn and looks at each.
-    fn look_at(&self, field: &Arc<Field>, form: &Form, views: &[(&'static str, View)]) -> Result<Vec<Finding>> {
-        let mut technique = form.entry.prepare(field, &form.settings).map_err(anyhow::Error::msg)?;
-        let mut seen = Seen { holes: 0, holes_at: None, drawn: Ok(()), again: Ok(()) };
+    /// Draws views in order and checks each.
+    fn check_views(
+        &self,
+        field: &Arc<Field>,
+        config: &TechniqueConfig,
+        views: &[(&'static str, View)],
+    ) -> Result<Vec<Finding>> {
+        let mut technique = config.entry.prepare(field, &config.settings).map_err(anyhow::Error::msg)?;
+        let mut results = ImageResults { holes: 0, holes_at: None, drawn: Ok(()), again: Ok(()) };
         let mut renderer: Option<(SceneRenderer, [u32; 2])> = None;
         for (name, view) in views {
             let view = View { size: view.size.map(|side| side.min(MAX_PX)), ..*view };
@@ -72,18 +78,18 @@ impl DeviceImageChecker {
                 renderer = Some((self.renderer(field, technique.as_ref(), view.size)?, view.size));
             }
             let Some((renderer, _)) = &mut renderer else { continue };
-            self.frame(field, technique.as_mut(), renderer, (name, view), &mut seen).context(*name)?;
+            self.check_frame(field, technique.as_mut(), renderer, (name, view), &mut results).context(*name)?;
         }
-        Ok(seen.findings())
+        Ok(results.findings())
     }
 
-    fn frame(
+    fn check_frame(
         &self,
         field: &Arc<Field>,
         technique: &mut dyn Technique,
         renderer: &mut SceneRenderer,
         named: (&'static str, View),
-        seen: &mut Seen,
+        results: &mut ImageResults,
     ) -> Result<()> {
         let view = &named.1;
         let violation = |why: &str| Err(Violation::new(named, why));
@@ -94,25 +100,26 @@ impl DeviceImageChecker {
             ScenePlan::builder(field, &self.look, &self.gpu.device_limits()).build().map_err(anyhow::Error::msg)?;
         let scene = self.scene(field, &plan);
         let holes = Truth::new(&scene, view)?.hole_pixels(&scene, view, &picture)?.len();
-        if holes > 0 && seen.holes_at.is_none() {
-            seen.holes_at = Some(Violation::new(named, format!("{holes} pixels of sky where land is")));
+        if holes > 0 && results.holes_at.is_none() {
+            results.holes_at = Some(Violation::new(named, format!("{holes} pixels of sky where terrain is")));
         }
-        seen.holes += holes;
+        results.holes += holes;
         if renderer.captures() && !is_as_listed(field, technique, renderer, view)? {
-            seen.drawn = seen.drawn.clone().and(violation("the device draws other triangles than the list says"));
+            results.drawn =
+                results.drawn.clone().and(violation("the device draws other triangles than the list contains"));
         }
         if technique.is_settled() {
             renderer.draw(technique, view, Copy::PictureAndDepth)?;
             renderer.complete()?;
             if technique.is_settled() && renderer.picture() != picture {
-                seen.again = seen.again.clone().and(violation("the same frame has another picture"));
+                results.again = results.again.clone().and(violation("the same frame gives another image"));
             }
         }
         Ok(())
     }
 }
 
-/// Whether the triangles captured on the device are those of the list, to the bit.
+/// Returns true if the triangles captured on the device equal those of the list, to the bit.
 fn is_as_listed(field: &Field, technique: &dyn Technique, renderer: &mut SceneRenderer, view: &View) -> Result<bool> {
     let placing = Frame::placing(field, view);
     let expanded = [
@@ -123,9 +130,9 @@ fn is_as_listed(field: &Field, technique: &dyn Technique, renderer: &mut SceneRe
     Ok(captured.iter().zip(&expanded).all(|(there, here)| there.iter().map(|t| t.drawn).eq(here.iter().copied())))
 }
 
-impl Seen {
+impl ImageResults {
     fn findings(self) -> Vec<Finding> {
-        let holes = Finding::within("pixels of sky through land", self.holes as f64, 0.0);
+        let holes = Finding::within("pixels of sky through terrain", self.holes as f64, 0.0);
         vec![
             Finding { violation: self.holes_at, ..holes },
             Finding::holds("the device draws the list", self.drawn),
@@ -135,7 +142,7 @@ impl Seen {
 }
 
 impl ImageChecker for DeviceImageChecker {
-    fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding> {
+    fn check(&mut self, case: &Case, config: &TechniqueConfig) -> Vec<Finding> {
         let (field, views) = match &case.kind {
             Kind::Terrain(terrain) => {
                 let StressTerrain { field, views } = terrain();
@@ -145,18 +152,18 @@ impl ImageChecker for DeviceImageChecker {
                 let Flight { field, views } = flight();
                 (field, views.into_iter().take(FRAMES).map(|view| ("a frame", view)).collect())
             }
-            Kind::Each(_) | Kind::Alone(..) => return Vec::new(),
+            Kind::PerTechnique(_) | Kind::Standalone(..) => return Vec::new(),
         };
-        let looked = self.look_at(&field, form, &views);
-        looked.unwrap_or_else(|e| vec![Finding::within("drawn", 1.0, 0.0).because(Some(format!("{e:#}")))])
+        let findings = self.check_views(&field, config, &views);
+        findings.unwrap_or_else(|e| vec![Finding::within("drawn", 1.0, 0.0).with_reason(Some(format!("{e:#}")))])
     }
 
-    fn is_blind(&self) -> Option<String> {
+    fn device_loss(&self) -> Option<String> {
         self.gpu.is_lost().then(|| self.gpu.loss())
     }
 
-    fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage> {
-        let mut technique = form.entry.prepare(field, &form.settings).ok()?;
+    fn picture(&mut self, field: &Arc<Field>, config: &TechniqueConfig, view: &View) -> Option<image::RgbaImage> {
+        let mut technique = config.entry.prepare(field, &config.settings).ok()?;
         let view = View { size: view.size.map(|side| side.clamp(MAX_PX / 2, 4 * MAX_PX)), ..*view };
         let mut renderer = self.renderer(field, technique.as_ref(), view.size).ok()?;
         renderer.draw(technique.as_mut(), &view, Copy::PictureAndDepth).ok()?;

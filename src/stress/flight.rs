@@ -1,9 +1,9 @@
-//! A field that is flown over: every frame is one surface within its tolerance, whatever time does.
+//! A flight over a field: every frame must be one surface within its tolerance, however time passes.
 
 use std::sync::Arc;
 
 use super::Finding;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::invariants::{SLACK, Violation};
 use super::terrain::all_numbers;
 use crate::draw::DrawList;
@@ -12,18 +12,18 @@ use crate::lod::Technique;
 use crate::measure::{geometric, watertight};
 use crate::view::View;
 
-/// A field, and frame by frame where it is looked at from.
+/// A field and a sequence of views.
 pub struct Flight {
     /// The field.
     pub field: Arc<Field>,
-    /// One a frame.
+    /// One view per frame.
     pub views: Vec<View>,
 }
 
-/// Flies with a technique and holds every frame against what each frame keeps.
-pub fn examine(flight: &Flight, form: &Form) -> Vec<Finding> {
-    let mut technique = (form.entry.build)(Arc::clone(&flight.field), &form.settings);
-    let mut check = Check { surface: Ok(()), numbers: Ok(()), error: 0.0, worst: None, pending: 0 };
+/// Flies with a technique and checks every frame.
+pub fn examine(flight: &Flight, config: &TechniqueConfig) -> Vec<Finding> {
+    let mut technique = (config.entry.build)(Arc::clone(&flight.field), &config.settings);
+    let mut check = FrameChecks { surface: Ok(()), numbers: Ok(()), error: 0.0, worst: None, pending: 0 };
     for view in &flight.views {
         let mut list = DrawList::default();
         technique.select(view, &mut list);
@@ -32,18 +32,19 @@ pub fn examine(flight: &Flight, form: &Form) -> Vec<Finding> {
     check.findings()
 }
 
-/// What was found so far.
-struct Check {
+/// Results of the frames so far.
+struct FrameChecks {
     surface: Result<(), Violation>,
     numbers: Result<(), Violation>,
-    /// The largest over its tolerance.
+    /// Largest screen error relative to the tolerance.
     error: f64,
+    /// The frame with the largest error.
     worst: Option<Violation>,
-    /// Frames with something coarser than it should be.
+    /// Frames that draw coarser data than required because finer data is pending.
     pending: usize,
 }
 
-impl Check {
+impl FrameChecks {
     fn frame(&mut self, field: &Field, technique: &dyn Technique, view: &View, list: &DrawList) {
         let violation = |why: String| Violation::new(("a frame", *view), why);
         let (seams, resident) = (technique.pipeline_requirements().seams, technique.resident());
@@ -70,7 +71,7 @@ impl Check {
             Finding::holds("one surface in every frame", self.surface),
             Finding { violation, ..error },
             Finding::holds("no NaN, no subnormal, weights in [0, 1]", self.numbers),
-            Finding::reported("frames in which something waits", self.pending as f64),
+            Finding::reported("frames with pending data", self.pending as f64),
         ]
     }
 }

@@ -1,7 +1,8 @@
-//! The laws that every technique keeps in every form, on every field, from every view. No device is needed.
+//! The invariants that every technique keeps with every configuration, on every field, from every view. No GPU is
+//! needed.
 //!
-//! A law is a function over a field, a technique and views, so that tests can hold it against techniques that break
-//! it, and the suite against any field and view.
+//! An invariant is a function of a field, a technique and views. Tests apply invariants to mutants (techniques with
+//! one mechanism broken), the suite to any field and view.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -18,31 +19,31 @@ use crate::lod::Technique;
 use crate::measure::{geometric, in_view, watertight};
 use crate::view::View;
 
-/// A technique at work on a field, and where it is looked at from.
+/// A technique on a field, with views, as the input of an invariant.
 pub struct Subject<'a> {
-    /// What it draws.
+    /// The field.
     pub field: &'a Field,
     /// The technique.
     pub technique: &'a mut dyn Technique,
-    /// Views and their names.
+    /// Names and views.
     pub views: &'a [(&'static str, View)],
-    /// Tolerances, pixels, widest last, for what is compared between them.
+    /// Tolerances for comparisons, pixels, in ascending order.
     pub tolerances_px: &'a [f64],
-    /// The scene's time, seconds: it goes on from list to list.
+    /// Scene time of the last list, seconds; advances by 1 s per list.
     pub time_s: f64,
 }
 
-/// What breaks a law.
+/// A violation of an invariant.
 #[derive(Clone, Debug)]
 pub struct Violation {
-    /// The view in which it does, and its name.
+    /// Name and view in which it occurs.
     pub view: Box<(&'static str, View)>,
-    /// How.
+    /// Reason.
     pub why: String,
 }
 
 impl Violation {
-    /// In a view.
+    /// Creates a violation in a view.
     pub fn new(view: (&'static str, View), why: impl Into<String>) -> Self {
         Self { view: Box::new(view), why: why.into() }
     }
@@ -54,31 +55,32 @@ impl fmt::Display for Violation {
     }
 }
 
-/// A law.
+/// An invariant.
 pub struct Invariant {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// The techniques that it is for; empty: all.
+    /// Techniques it applies to; empty for all.
     pub only: &'static [&'static str],
-    /// Says what breaks it.
+    /// Returns the first violation found.
     pub check: fn(&mut Subject) -> Result<(), Violation>,
 }
 
 impl Invariant {
-    /// Whether it is for a technique.
+    /// Returns true if the invariant applies to a technique.
     pub fn is_for(&self, technique: &str) -> bool {
         self.only.is_empty() || self.only.contains(&technique)
     }
 }
 
+/// Creates an invariant for all techniques.
 const fn invariant(name: &'static str, check: fn(&mut Subject) -> Result<(), Violation>) -> Invariant {
     Invariant { name, only: &[], check }
 }
 
-/// Every law.
+/// All invariants.
 pub const INVARIANTS: &[Invariant] = &[
     invariant("one surface", one_surface),
-    invariant("everything in sight is drawn", everything_in_sight),
+    invariant("everything in view is drawn", everything_in_view),
     invariant("error within tolerance", error_within_tolerance),
     invariant("same view, same list", same_view_same_list),
     invariant("teleport and return, same list", teleport_and_return),
@@ -92,21 +94,21 @@ pub const INVARIANTS: &[Invariant] = &[
     },
 ];
 
-/// Tolerances that suit any field, pixels, widest last.
+/// Tolerances that suit any field, pixels, in ascending order.
 pub const TOLERANCES_PX: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 
-/// What rounding may add to a screen error, relative. Heights are compared as the f32 they are drawn with and
+/// Relative allowance for rounding in a screen error. Heights are compared as the f32 values that are drawn;
 /// everything else is f64, whose rounding over a projection stays far below this.
 pub const SLACK: f64 = 1e-9;
 
-/// In so many frames of one view everything settles: a few for each tile of the largest field.
+/// Upper limit of frames of one view until a technique settles: a few for each tile of the largest field.
 const MAX_FRAMES: usize = 5000;
 
-/// How far away is elsewhere, whatever the field, metres.
+/// Distance of a teleport out of any field, metres.
 const ELSEWHERE_M: f64 = 1e9;
 
 impl Subject<'_> {
-    /// The list of a view once the technique has settled in it.
+    /// Returns the list of a view once the technique has settled.
     pub fn select(&mut self, view: &View) -> Result<DrawList, String> {
         for _ in 0..MAX_FRAMES {
             let list = self.select_once(view);
@@ -117,7 +119,7 @@ impl Subject<'_> {
         Err(format!("not settled after {MAX_FRAMES} frames of one view"))
     }
 
-    /// The next list of a view, a second after the last one.
+    /// Returns the next list of a view, one second after the previous one.
     pub fn select_once(&mut self, view: &View) -> DrawList {
         let mut list = DrawList::default();
         self.time_s += 1.0;
@@ -125,31 +127,32 @@ impl Subject<'_> {
         list
     }
 
-    /// The triangles of a view, and how many fraction bits their corners have.
+    /// Returns the triangles of a view and the fraction bits of their corners.
     fn drawn(&mut self, view: &View) -> Result<(Vec<Drawn>, u32), String> {
         let list = self.select(view)?;
         Ok((self.expanded(view, &list), list.fraction_bits))
     }
 
-    /// The triangles of a list.
+    /// Returns the triangles of a list.
     fn expanded(&self, view: &View, list: &DrawList) -> Vec<Drawn> {
         let frame = Frame::placing(self.field, view);
         expand::triangles(self.field, &frame, self.technique.resident(), list)
     }
 
-    /// Runs a check in every view and names the view that breaks it.
+    /// Runs a check in every view and reports the first violation.
     fn in_every_view(&mut self, check: impl Fn(&mut Self, &View) -> Result<(), String>) -> Result<(), Violation> {
         self.views.iter().try_for_each(|view| check(self, &view.1).map_err(|why| Violation::new(*view, why)))
     }
 }
 
-/// No crack or T-junction, covered once, every triangle faces up, no gap in sight. With skirts: every gap is hidden.
+/// No cracks or T-junctions, every point covered once, triangles facing up, no visible gap. For techniques with
+/// skirts: every gap is hidden by one.
 fn one_surface(subject: &mut Subject) -> Result<(), Violation> {
     let [w, h] = subject.field.size().map(i64::from);
     subject.in_every_view(|subject, view| {
         let whole = 2 * (w - 1) * (h - 1);
         let all_terrain = subject.field.holes().count() == 0 && views::sees_everything(subject.field, view);
-        // As it arrives, and once it has settled.
+        // The first list of the view, and the settled one.
         [false, true].into_iter().try_for_each(|settles| {
             let list = if settles { subject.select(view)? } else { subject.select_once(view) };
             let seams = subject.technique.pipeline_requirements().seams;
@@ -161,9 +164,9 @@ fn one_surface(subject: &mut Subject) -> Result<(), Violation> {
     })
 }
 
-/// Every sample in the picture, as far as the list reaches, lies in a drawn triangle: the prover's last step another way, by exact
-/// projection instead of boxes, and by points instead of areas.
-fn everything_in_sight(subject: &mut Subject) -> Result<(), Violation> {
+/// Every visible sample within the list's reach lies in a drawn triangle. This repeats the last step of
+/// [`watertight`] independently, by exact projection of points instead of boxes and areas.
+fn everything_in_view(subject: &mut Subject) -> Result<(), Violation> {
     let terrain = samples_of_terrain(subject.field);
     subject.in_every_view(|subject, view| {
         let [w, h] = subject.field.size();
@@ -184,7 +187,7 @@ fn everything_in_sight(subject: &mut Subject) -> Result<(), Violation> {
     })
 }
 
-/// Samples that are corners of a triangle with data.
+/// Returns the samples that are corners of a triangle with data.
 fn samples_of_terrain(field: &Field) -> Vec<u32> {
     let [w, h] = field.size();
     let mut terrain = vec![false; (w * h) as usize];
@@ -195,7 +198,7 @@ fn samples_of_terrain(field: &Field) -> Vec<u32> {
     (0..w * h).filter(|&k| terrain[k as usize]).collect()
 }
 
-/// No sample in view is drawn further away than the tolerance says, with the certified metric.
+/// No sample in view is drawn with a screen error above the tolerance, under the certified metric.
 fn error_within_tolerance(subject: &mut Subject) -> Result<(), Violation> {
     if !subject.technique.keeps_tolerance() {
         return Ok(());
@@ -207,11 +210,11 @@ fn error_within_tolerance(subject: &mut Subject) -> Result<(), Violation> {
             let list = subject.select(&view)?;
             let is_same = |last: &DrawList| last.tolerance_scale == 1.0 && same_list(last, &list);
             if last.as_ref().is_some_and(is_same) {
-                // The same triangles kept a narrower tolerance already.
+                // The same triangles passed at a smaller tolerance already.
                 return Ok(());
             }
             let errors = geometric::errors(subject.field, &view, subject.technique.resident(), &list);
-            // A list that does not fit is made under a wider tolerance, and says so; one wider than the picture is none.
+            // A list that did not fit reports a larger tolerance. A tolerance beyond the image size is no bound.
             let (max, px) = (errors.screen_px.max, px * list.tolerance_scale);
             let is_bound = list.tolerance_scale == 1.0 || px < f64::from(view.size[0].max(view.size[1]));
             last = Some(list);
@@ -220,6 +223,7 @@ fn error_within_tolerance(subject: &mut Subject) -> Result<(), Violation> {
     })
 }
 
+/// Two lists in a row of one view are equal.
 fn same_view_same_list(subject: &mut Subject) -> Result<(), Violation> {
     subject.in_every_view(|subject, view| {
         let (first, second) = (subject.select(view)?, subject.select(view)?);
@@ -227,19 +231,20 @@ fn same_view_same_list(subject: &mut Subject) -> Result<(), Violation> {
     })
 }
 
-/// A room with uploads may keep its geometry elsewhere after a journey: then what is drawn must be the same.
+/// The list of a view is the same after a teleport and return. Techniques with uploads may store geometry elsewhere
+/// afterwards; for them the drawn triangles are compared.
 fn teleport_and_return(subject: &mut Subject) -> Result<(), Violation> {
     let views = subject.views;
     let uploads = subject.technique.limits().upload_bytes > 0;
     views.iter().zip(views.iter().skip(3).chain(views)).try_for_each(|(view, (_, away))| {
-        let same = same_after_a_journey(subject, &view.1, away, uploads);
-        let same = same.and_then(|same| ensure(same, || "another list after a journey".into()));
+        let same = same_after_teleport(subject, &view.1, away, uploads);
+        let same = same.and_then(|same| ensure(same, || "another list after teleport and return".into()));
         same.map_err(|why| Violation::new(*view, why))
     })
 }
 
-fn same_after_a_journey(subject: &mut Subject, view: &View, away: &View, uploads: bool) -> Result<bool, String> {
-    // Both times it is a teleport.
+fn same_after_teleport(subject: &mut Subject, view: &View, away: &View, uploads: bool) -> Result<bool, String> {
+    // Teleport both times.
     let elsewhere = View { eye: view.eye + DVec3::X * ELSEWHERE_M, ..*view };
     subject.select_once(&elsewhere);
     let list = subject.select(view)?;
@@ -288,6 +293,7 @@ fn in_range(geometry: &Geometry, draw: &Draw) -> bool {
     indices.is_some_and(|indices| indices.iter().all(fits))
 }
 
+/// A larger tolerance never draws more triangles.
 fn wider_never_more(subject: &mut Subject) -> Result<(), Violation> {
     let tolerances_px = subject.tolerances_px;
     subject.in_every_view(|subject, view| {
@@ -297,7 +303,7 @@ fn wider_never_more(subject: &mut Subject) -> Result<(), Violation> {
     })
 }
 
-/// No instance of only holes is drawn. (That all land is drawn is the law of everything in sight.)
+/// No instance that contains only holes is drawn. ([`everything_in_view`] checks that all terrain is.)
 fn holes_stay_holes(subject: &mut Subject) -> Result<(), Violation> {
     subject.in_every_view(|subject, view| {
         let mut boxes: HashMap<u32, [i32; 4]> = HashMap::new();
@@ -313,12 +319,12 @@ fn holes_stay_holes(subject: &mut Subject) -> Result<(), Violation> {
             let [west, north] = [west, north].map(|n| n >> bits);
             let [east, south] = [east, south].map(|n| -(-n >> bits));
             let terrain = has_terrain(subject.field, [west, north], [east, south]);
-            ensure(terrain, || format!("nothing but holes in ({west}, {north}) to ({east}, {south})"))
+            ensure(terrain, || format!("only holes in ({west}, {north}) to ({east}, {south})"))
         })
     })
 }
 
-/// Blocks side by side are within one level of each other.
+/// Adjacent blocks differ by at most one level.
 fn neighbours_within_one_level(subject: &mut Subject) -> Result<(), Violation> {
     subject.in_every_view(|subject, view| {
         let list = subject.select(view)?;

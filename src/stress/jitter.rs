@@ -1,6 +1,8 @@
-//! How far vertices of a still scene tremble on the screen while the camera moves slowly, for three ways to place them:
-//! world coordinates in single precision; double-precision differences to the eye rounded once; and the product's own,
-//! differences of whole samples to the one nearest the eye ([`place::relative_position`](crate::draw::place)).
+//! Measures the jitter of static vertices on the screen under slow camera motion, for three ways to compute vertex
+//! positions.
+//!
+//! The ways: world coordinates in f32; f64 differences to the eye, rounded once; and the renderer's own, integer
+//! sample differences to the render origin ([`place::relative_position`](crate::draw::place)).
 
 use std::io;
 use std::path::Path;
@@ -20,63 +22,64 @@ use crate::height::save::replace;
 use crate::measure::in_view;
 use crate::view::{Lens, Metric, Tolerance, View};
 
-/// What the product may tremble by, pixels.
+/// Limit of the renderer's jitter, pixels.
 pub const LIMIT_PX: f64 = 1.0 / 16.0;
 
-/// Radius of the Earth, and a millimetre, metres.
+/// Radius of the Earth plus a millimetre, metres.
 pub const EARTH_M: f64 = 6.4e6 + 1e-3;
 
-/// Where the scene lies, metres from the world's origin along both axes.
-pub const PLACES: [(f64, &str); 4] = [(0.0, "0 m"), (1e5, "1e5 m"), (1e7, "1e7 m"), (EARTH_M, "the Earth's radius")];
+/// Distances of the scene from the world's origin along both axes, metres.
+pub const ORIGINS: [(f64, &str); 4] = [(0.0, "0 m"), (1e5, "1e5 m"), (1e7, "1e7 m"), (EARTH_M, "the Earth's radius")];
 
-/// Frames, and how far the camera moves in each, metres.
+/// Number of frames, and camera motion per frame, metres.
 const FRAMES: usize = 48;
 const STEP_M: f64 = 0.05;
 
-/// A way to place vertices.
+/// A way to compute vertex positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum VertexPlacement {
     /// World coordinates as f32, with one matrix from world to clip space.
-    World,
+    WorldF32,
     /// Differences to the eye in f64, rounded to f32.
-    Relative,
-    /// As the vertex program does it.
-    Product,
+    EyeRelative,
+    /// Integer sample differences to the render origin, as in the vertex shader.
+    SampleRelative,
 }
 
-/// The ways, and what they are called in the suite's rows.
-pub const MORPH_RANGES: [(Way, &str); 3] = [
-    (Way::World, "world coordinates in single precision, px"),
-    (Way::Relative, "relative to the camera, px"),
-    (Way::Product, "as it is drawn, px"),
+/// All placements with their check names.
+pub const PLACEMENTS: [(VertexPlacement, &str); 3] = [
+    (VertexPlacement::WorldF32, "world coordinates in single precision, px"),
+    (VertexPlacement::EyeRelative, "relative to the camera, px"),
+    (VertexPlacement::SampleRelative, "as it is drawn, px"),
 ];
 
-/// How much each sample of a field trembles, pixels; none for samples out of sight.
+/// Jitter of each sample of a field, pixels; `None` for samples out of view.
 pub struct Jitter {
     size: [u32; 2],
     px: Vec<Option<f64>>,
 }
 
 impl Jitter {
-    /// Of a field at some place, for one way.
-    pub fn of(origin_m: f64, way: Way) -> Self {
+    /// Measures a field at a distance from the world's origin, metres.
+    pub fn of(origin_m: f64, placement: VertexPlacement) -> Self {
         let field = hills_at(origin_m);
         let views: Vec<_> = (0..FRAMES).map(|frame| view(&field, frame)).collect();
         let [w, h] = field.size();
         let of_sample = |k: u32| {
-            let off: Option<Vec<_>> = views.iter().map(|view| off(&field, view, way, [k % w, k / w])).collect();
-            Some(off?.array_windows().map(|[a, b]| (*b - *a).length()).fold(0.0, f64::max))
+            let offset: Option<Vec<_>> =
+                views.iter().map(|view| offset(&field, view, placement, [k % w, k / w])).collect();
+            Some(offset?.array_windows().map(|[a, b]| (*b - *a).length()).fold(0.0, f64::max))
         };
         Self { size: [w, h], px: (0..w * h).map(of_sample).collect() }
     }
 
-    /// The largest, pixels.
+    /// Returns the largest jitter, pixels.
     pub fn max_px(&self) -> f64 {
         self.px.iter().flatten().copied().fold(0.0, f64::max)
     }
 
-    /// A pixel a sample: grey where out of sight, from blue (none) over white (the limit) to red (16 times the limit and
-    /// more).
+    /// Returns an image with a pixel per sample: grey out of view, else from blue (none) over white (the limit) to
+    /// red (at least 16 times the limit).
     pub fn map(&self) -> RgbImage {
         let colour = |px: f64| {
             let level = (px / LIMIT_PX).max(1e-9).log2() / 4.0;
@@ -88,21 +91,25 @@ impl Jitter {
     }
 }
 
-/// The three ways at one place.
+/// Returns the findings for all placements at a distance from the world's origin, metres.
 pub fn findings(origin_m: f64) -> Vec<Finding> {
-    let finding = |(way, name): (Way, &'static str)| {
-        let px = Jitter::of(origin_m, way).max_px();
-        if way == Way::Product { Finding::within(name, px, LIMIT_PX) } else { Finding::reported(name, px) }
+    let finding = |(placement, name): (VertexPlacement, &'static str)| {
+        let px = Jitter::of(origin_m, placement).max_px();
+        if placement == VertexPlacement::SampleRelative {
+            Finding::within(name, px, LIMIT_PX)
+        } else {
+            Finding::reported(name, px)
+        }
     };
-    MORPH_RANGES.map(finding).to_vec()
+    PLACEMENTS.map(finding).to_vec()
 }
 
-/// A camera that creeps over the land.
+/// Returns a frame of a camera that moves slowly over the terrain.
 fn view(field: &Field, frame: usize) -> View {
     let start = field.world_at(30.0, 70.0, 330.0);
-    let way = glam::DVec3::new(0.7, 0.1, -0.7) * STEP_M * frame as f64;
+    let travelled = glam::DVec3::new(0.7, 0.1, -0.7) * STEP_M * frame as f64;
     View {
-        eye: start + way,
+        eye: start + travelled,
         world_from_eye: View::turned(-50.0, -20.0, 0.0),
         lens: Lens::Perspective { fov_x: 60f64.to_radians() },
         size: [1920, 1080],
@@ -112,20 +119,21 @@ fn view(field: &Field, frame: usize) -> View {
     }
 }
 
-/// How far off its true place a sample is drawn in a view, pixels; `None` if it is out of sight.
-fn off(field: &Field, view: &View, way: Way, [i, j]: [u32; 2]) -> Option<DVec2> {
+/// Returns the difference between the drawn and the exact screen position of a sample, pixels; `None` if it is out of
+/// view.
+fn offset(field: &Field, view: &View, placement: VertexPlacement, [i, j]: [u32; 2]) -> Option<DVec2> {
     let point = field.world(i, j);
     if !in_view(view, point) {
         return None;
     }
     let truth = view.project(point)?.pixel;
-    let drawn = match way {
-        Way::World => {
+    let drawn = match placement {
+        VertexPlacement::WorldF32 => {
             let clip_from_world = view.clip_from_relative() * glam::DMat4::from_translation(-view.eye);
             clip_from_world.as_mat4() * point.as_vec3().extend(1.0)
         }
-        Way::Relative => view.clip_from_relative().as_mat4() * (point - view.eye).as_vec3().extend(1.0),
-        Way::Product => {
+        VertexPlacement::EyeRelative => view.clip_from_relative().as_mat4() * (point - view.eye).as_vec3().extend(1.0),
+        VertexPlacement::SampleRelative => {
             let frame = Frame::placing(field, view);
             let relative = relative_position(&frame, [i as i32, j as i32], field.height(i, j));
             Mat4::from_cols_array_2d(&frame.camera.clip_from_relative) * Vec3::from(relative).extend(1.0)
@@ -134,23 +142,23 @@ fn off(field: &Field, view: &View, way: Way, [i, j]: [u32; 2]) -> Option<DVec2> 
     Some(pixel(drawn, view) - truth)
 }
 
-/// Where the rasteriser finds a position in clip space, pixels.
+/// Converts a clip-space position to pixels.
 fn pixel(clip: Vec4, view: &View) -> DVec2 {
     let size = DVec2::new(view.size[0].into(), view.size[1].into());
     let at = DVec2::new((clip.x / clip.w).into(), (clip.y / clip.w).into());
     (at + 1.0) / 2.0 * size
 }
 
-/// Saves a map of each way at each place, an enlarged pixel a sample, and says what they show.
+/// Saves the jitter image of each placement and origin, enlarged, and returns files with captions.
 pub fn save_maps(folder: &Path) -> Result<Vec<Picture>> {
     const ENLARGED: u32 = 3;
     let mut pictures = Vec::new();
-    for (origin_m, place) in PLACES {
-        for (way, name) in MORPH_RANGES {
-            let jitter = Jitter::of(origin_m, way);
+    for (origin_m, place) in ORIGINS {
+        for (placement, name) in PLACEMENTS {
+            let jitter = Jitter::of(origin_m, placement);
             let [w, h] = jitter.size;
             let map = resize(&jitter.map(), ENLARGED * w, ENLARGED * h, FilterType::Nearest);
-            let file = format!("jitter-{place}-{way:?}.png").to_lowercase().replace(' ', "-").replace('\'', "");
+            let file = format!("jitter-{place}-{placement:?}.png").to_lowercase().replace(' ', "-").replace('\'', "");
             let path = folder.join(&file);
             replace(&path, |out| map.write_to(out, ImageFormat::Png).map_err(io::Error::other))
                 .with_context(|| path.display().to_string())?;

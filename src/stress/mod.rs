@@ -1,9 +1,9 @@
-//! The stability suite: every technique on stiff and extreme fields, positions, views and times; the budget
-//! controller on loads that are hard to hold; the loaders on broken files. A case passes when the picture and the
-//! numbers are right, not when nothing crashed.
+//! The stress suite: every technique on stiff and extreme fields, positions, views and times; the budget controller
+//! on simulated loads; the file loaders on broken files. A case passes if images and numbers are right, not merely if
+//! nothing crashes.
 //!
-//! A case is a row of [`FAMILIES`]; what is found in it, a [`Row`] for each technique and check. A technique that is new
-//! in the table is in the suite.
+//! [`FAMILIES`] lists the cases. Each technique and check of a case gives a [`Row`]. Every technique in the table
+//! takes part automatically.
 
 mod arithmetic;
 mod fields;
@@ -36,77 +36,78 @@ use crate::height::Field;
 use crate::view::View;
 
 pub use self::flight::Flight;
-pub use self::forms::Form;
+pub use self::forms::TechniqueConfig;
 use self::invariants::Violation;
 pub use self::rows::{Picture, Row, SCHEMA, Stress};
 pub use self::terrain::StressTerrain;
 
-/// What a check found.
+/// The result of one check.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The check, with its unit where it has one.
+    /// Name of the check, with its unit if it has one.
     pub check: &'static str,
-    /// What was found.
+    /// Measured value.
     pub value: f64,
-    /// The most that passes; `None`: it is only told.
+    /// Largest value that passes; `None` if the value is only reported.
     pub limit: Option<f64>,
-    /// Where it failed, and how.
+    /// View in which the check failed, and the reason.
     pub violation: Option<Violation>,
-    /// How it failed, where no view is to blame.
+    /// Reason of a failure that does not depend on a view.
     pub why: Option<String>,
 }
 
 impl Finding {
-    /// A value that is at most a limit.
+    /// Creates a finding that passes if the value is at most the limit.
     pub fn within(check: &'static str, value: f64, limit: f64) -> Self {
         Self { check, value, limit: Some(limit), violation: None, why: None }
     }
 
-    /// A value that is only told: what others are compared with.
+    /// Creates a finding without a limit, for comparison.
     pub fn reported(check: &'static str, value: f64) -> Self {
         Self { check, value, limit: None, violation: None, why: None }
     }
 
-    /// 0 where something holds, else 1.
+    /// Creates a finding with value 0 if the outcome is `Ok`, else 1; the limit is 0.
     pub fn holds(check: &'static str, outcome: Result<(), Violation>) -> Self {
         let violation = outcome.err();
         Self { violation: violation.clone(), ..Self::within(check, f64::from(u8::from(violation.is_some())), 0.0) }
     }
 
-    /// The same, with how it failed.
-    pub fn because(self, why: Option<String>) -> Self {
+    /// Returns the finding with a reason.
+    pub fn with_reason(self, why: Option<String>) -> Self {
         Self { why, ..self }
     }
 
-    /// Whether the value is within its limit; no number never is.
+    /// Returns true if the value is within its limit. NaN never is.
     pub fn passes(&self) -> bool {
         self.limit.is_none_or(|limit| self.value <= limit)
     }
 }
 
-/// What is done in a case.
+/// The action of a case.
 pub enum Kind {
-    /// Every technique draws a field from views, and every law is held against what it draws.
+    /// Draws a field from several views with every technique and checks every invariant.
     Terrain(fn() -> StressTerrain),
-    /// Every technique, in every word of its settings, is flown; each frame is one surface within its tolerance.
+    /// Flies over a field with every technique and each of its settings' words. Each frame must be one surface within
+    /// its tolerance.
     Flight(fn() -> Flight),
-    /// Something of its own is done with every technique.
-    Each(fn(&Form) -> Vec<Finding>),
-    /// No technique takes part: whose it is, and what is done.
-    Alone(&'static str, fn() -> Vec<Finding>),
+    /// Runs a custom check with every technique.
+    PerTechnique(fn(&TechniqueConfig) -> Vec<Finding>),
+    /// Runs a check without techniques; the first value names its subject.
+    Standalone(&'static str, fn() -> Vec<Finding>),
 }
 
-/// A row of the suite.
+/// A case of the suite.
 pub struct Case {
-    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
+    /// Family: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: &'static str,
-    /// Its name.
+    /// Name, unique in its family.
     pub name: &'static str,
-    /// What is done.
+    /// Action.
     pub kind: Kind,
 }
 
-/// The suite, family by family.
+/// The cases of the suite by family.
 pub const FAMILIES: &[&[Case]] = &[
     fields::CASES,
     position::CASES,
@@ -118,133 +119,136 @@ pub const FAMILIES: &[&[Case]] = &[
     sweep::CASES,
 ];
 
-/// All cases.
+/// Returns all cases.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     FAMILIES.iter().copied().flatten()
 }
 
-/// Looks at what a device draws.
+/// Draws cases on a GPU and checks the images.
 pub trait ImageChecker {
-    /// What it finds in the pictures of a case.
-    fn look(&mut self, case: &Case, form: &Form) -> Vec<Finding>;
+    /// Draws a case with a technique and returns the findings.
+    fn check(&mut self, case: &Case, config: &TechniqueConfig) -> Vec<Finding>;
 
-    /// A picture of a field, if it can be drawn.
-    fn picture(&mut self, field: &Arc<Field>, form: &Form, view: &View) -> Option<image::RgbaImage>;
+    /// Draws one view of a field; `None` if that fails.
+    fn picture(&mut self, field: &Arc<Field>, config: &TechniqueConfig, view: &View) -> Option<image::RgbaImage>;
 
-    /// Why it can look no more, if so.
-    fn is_blind(&self) -> Option<String> {
+    /// Returns the reason if the device is lost and nothing more can be drawn.
+    fn device_loss(&self) -> Option<String> {
         None
     }
 }
 
-/// A case with one technique or, if it needs none, without.
-pub struct Trial {
+/// A case with one technique, or without one if it is standalone.
+pub struct CaseRun {
     /// The case.
     pub case: &'static Case,
-    /// The technique.
-    pub form: Option<Form>,
+    /// The technique and its settings; `None` for a standalone case.
+    pub config: Option<TechniqueConfig>,
 }
 
-impl Trial {
-    /// Whose row it is.
+impl CaseRun {
+    /// Returns the name of the technique with its settings, or of a standalone case's subject.
     pub fn technique(&self) -> String {
-        match (&self.form, &self.case.kind) {
-            (Some(form), _) => form.name.clone(),
-            (None, Kind::Alone(whose, _)) => whose.to_string(),
-            (None, _) => unreachable!("only what stands alone has no technique"),
+        match (&self.config, &self.case.kind) {
+            (Some(config), _) => config.name.clone(),
+            (None, Kind::Standalone(subject, _)) => subject.to_string(),
+            (None, _) => unreachable!("only standalone cases have no technique"),
         }
     }
 
-    /// Whether a device draws it, if there is one: a technique with its defaults and each variant.
+    /// Returns true if an [`ImageChecker`] draws the run: terrain and flights, with the default settings of each
+    /// variant.
     pub fn is_drawn(&self) -> bool {
         let has_picture = matches!(self.case.kind, Kind::Terrain(_) | Kind::Flight(_));
-        has_picture && self.form.as_ref().is_some_and(|form| form.choices.is_empty())
+        has_picture && self.config.as_ref().is_some_and(|config| config.choices.is_empty())
     }
 
-    /// What is found without a device. A panic is a finding.
+    /// Runs all checks that need no GPU. A panic becomes a finding.
     pub fn run(&self) -> Vec<Finding> {
-        let findings = catch_unwind(AssertUnwindSafe(|| match (&self.case.kind, &self.form) {
-            (Kind::Terrain(terrain), Some(form)) => terrain::examine(&terrain(), form),
-            (Kind::Flight(flight), Some(form)) => flight::examine(&flight(), form),
-            (Kind::Each(examine), Some(form)) => examine(form),
-            (Kind::Alone(_, examine), _) => examine(),
+        let findings = catch_unwind(AssertUnwindSafe(|| match (&self.case.kind, &self.config) {
+            (Kind::Terrain(terrain), Some(config)) => terrain::examine(&terrain(), config),
+            (Kind::Flight(flight), Some(config)) => flight::examine(&flight(), config),
+            (Kind::PerTechnique(examine), Some(config)) => examine(config),
+            (Kind::Standalone(_, examine), _) => examine(),
             (_, None) => Vec::new(),
         }));
-        findings.unwrap_or_else(|panic| vec![Finding::within("panics", 1.0, 0.0).because(Some(panic_text(&*panic)))])
+        findings
+            .unwrap_or_else(|panic| vec![Finding::within("panics", 1.0, 0.0).with_reason(Some(panic_text(&*panic)))])
     }
 }
 
-/// The text of a panic.
+/// Returns the message of a panic.
 fn panic_text(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
 }
 
-/// The trials of some cases with some techniques: in flights and on their own, the forms of every word.
-pub fn trials(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<Trial>, String> {
-    let mut trials = Vec::new();
+/// Combines cases with techniques (`name` or `name:variant`; all if empty). Flights use every word of every setting,
+/// other cases the default settings.
+pub fn case_runs(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<CaseRun>, String> {
+    let mut runs = Vec::new();
     for &case in cases {
-        let forms = match case.kind {
-            Kind::Terrain(_) | Kind::Each(_) => forms::plain(techniques)?,
-            Kind::Flight(_) => forms::every_word(techniques)?,
-            Kind::Alone(..) => Vec::new(),
+        let configs = match case.kind {
+            Kind::Terrain(_) | Kind::PerTechnique(_) => forms::with_defaults(techniques)?,
+            Kind::Flight(_) => forms::with_each_word(techniques)?,
+            Kind::Standalone(..) => Vec::new(),
         };
-        if let Kind::Alone(..) = case.kind {
-            trials.push(Trial { case, form: None });
+        if let Kind::Standalone(..) = case.kind {
+            runs.push(CaseRun { case, config: None });
         }
-        trials.extend(forms.into_iter().map(|form| Trial { case, form: Some(form) }));
+        runs.extend(configs.into_iter().map(|config| CaseRun { case, config: Some(config) }));
     }
-    Ok(trials)
+    Ok(runs)
 }
 
-/// What was found in trials, in their order.
-pub struct Found {
-    /// A list a trial; empty where it was not run.
+/// Findings of all runs, in the same order.
+pub struct SuiteResult {
+    /// Findings of each run; empty if it was not run.
     pub findings: Vec<Vec<Finding>>,
-    /// Why there is no more, if something was left out.
+    /// Reason why the suite ended early, if it did.
     pub ended: Option<String>,
 }
 
-/// Runs trials on all cores, and then those with pictures on a device, if there is one, until `stop` is set.
+/// Executes runs on all cores, and then those with images on a GPU if there is a checker, until `stop` is set.
 pub fn run(
-    trials: &[Trial],
-    eye: Option<&mut dyn ImageChecker>,
+    runs: &[CaseRun],
+    checker: Option<&mut dyn ImageChecker>,
     stop: &AtomicBool,
-    progress: impl Fn(&Trial) + Sync,
-) -> Found {
-    let run = |trial: &Trial| {
+    progress: impl Fn(&CaseRun) + Sync,
+) -> SuiteResult {
+    let execute = |run: &CaseRun| {
         (!stop.load(Relaxed)).then(|| {
-            progress(trial);
-            trial.run()
+            progress(run);
+            run.run()
         })
     };
-    let found: Vec<_> = trials.par_iter().map(run).collect();
-    let left_out = found.iter().filter(|findings| findings.is_none()).count();
-    let mut findings: Vec<_> = found.into_iter().map(Option::unwrap_or_default).collect();
-    let mut ended = (left_out > 0).then(|| format!("stopped: {left_out} of {} trials were not run", trials.len()));
-    if let Some(eye) = eye {
-        ended = ended.or(draw(trials, &mut findings, eye, stop, &progress));
+    let results: Vec<_> = runs.par_iter().map(execute).collect();
+    let not_run = results.iter().filter(|findings| findings.is_none()).count();
+    let mut findings: Vec<_> = results.into_iter().map(Option::unwrap_or_default).collect();
+    let mut ended = (not_run > 0).then(|| format!("stopped: {not_run} of {} runs were not executed", runs.len()));
+    if let Some(checker) = checker {
+        ended = ended.or(draw(runs, &mut findings, checker, stop, &progress));
     }
-    Found { findings, ended }
+    SuiteResult { findings, ended }
 }
 
-/// Draws the trials that have pictures; why not all of them, if so.
+/// Draws the runs that have images. Returns the reason if it ended early.
 fn draw(
-    trials: &[Trial],
+    runs: &[CaseRun],
     findings: &mut [Vec<Finding>],
-    eye: &mut dyn ImageChecker,
+    checker: &mut dyn ImageChecker,
     stop: &AtomicBool,
-    progress: &impl Fn(&Trial),
+    progress: &impl Fn(&CaseRun),
 ) -> Option<String> {
-    for (trial, findings) in trials.iter().zip(findings) {
-        let Some(form) = trial.form.as_ref().filter(|_| trial.is_drawn()) else { continue };
+    for (run, findings) in runs.iter().zip(findings) {
+        let Some(config) = run.config.as_ref().filter(|_| run.is_drawn()) else { continue };
         if stop.load(Relaxed) {
-            return Some("stopped: not all pictures were drawn".to_string());
+            return Some("stopped: not all images were drawn".to_string());
         }
-        progress(trial);
-        findings.extend(eye.look(trial.case, form));
-        if let Some(why) = eye.is_blind() {
-            return Some(format!("no more pictures: {why}"));
+        progress(run);
+        findings.extend(checker.check(run.case, config));
+        if let Some(why) = checker.device_loss() {
+            return Some(format!("no more images: {why}"));
         }
     }
     None

@@ -1,9 +1,9 @@
-//! Land far from the world's origin, and as much of it as there can be.
+//! Terrain far from the world's origin, and terrain of the largest size.
 
 use std::sync::Arc;
 
-use super::fields::{hills, hills_at, seen};
-use super::forms::Form;
+use super::fields::{hills, hills_at, with_views};
+use super::forms::TechniqueConfig;
 use super::invariants::Violation;
 use super::terrain::all_numbers;
 use super::{Case, Finding, Kind, StressTerrain, jitter};
@@ -20,27 +20,28 @@ pub const CASES: &[Case] = &[
     case("origin at 1e5 m", Kind::Terrain(|| at(1e5))),
     case("origin at 1e7 m", Kind::Terrain(|| at(1e7))),
     case("origin at the Earth's radius and a millimetre", Kind::Terrain(|| at(jitter::EARTH_M))),
-    case("500 000 x 500 000 samples", Kind::Each(half_a_million)),
-    case("jitter at 0 m", Kind::Alone("vertex-program", || jitter::findings(0.0))),
-    case("jitter at 1e5 m", Kind::Alone("vertex-program", || jitter::findings(1e5))),
-    case("jitter at 1e7 m", Kind::Alone("vertex-program", || jitter::findings(1e7))),
-    case("jitter at the Earth's radius", Kind::Alone("vertex-program", || jitter::findings(jitter::EARTH_M))),
+    case("500 000 x 500 000 samples", Kind::PerTechnique(half_a_million)),
+    case("jitter at 0 m", Kind::Standalone("vertex-program", || jitter::findings(0.0))),
+    case("jitter at 1e5 m", Kind::Standalone("vertex-program", || jitter::findings(1e5))),
+    case("jitter at 1e7 m", Kind::Standalone("vertex-program", || jitter::findings(1e7))),
+    case("jitter at the Earth's radius", Kind::Standalone("vertex-program", || jitter::findings(jitter::EARTH_M))),
 ];
 
+/// Returns hills at a distance from the world's origin, metres.
 fn at(origin_m: f64) -> StressTerrain {
-    seen(hills_at(origin_m))
+    with_views(hills_at(origin_m))
 }
 
-/// Frames of a path over it.
+/// Frames of the path.
 const FRAMES: usize = 4;
 
-/// A small field tiled to half a million samples a side, seen from near the ground as far as the horizon: lists fit the
-/// limits, and every number is one. Laws that look at all samples would take days.
-fn half_a_million(form: &Form) -> Vec<Finding> {
+/// Flies over a small field tiled to half a million samples a side, seen from near the ground to the horizon. Lists
+/// must fit the limits and all numbers must be finite. Invariants that visit all samples would take days.
+fn half_a_million(config: &TechniqueConfig) -> Vec<Finding> {
     let field = Arc::new(hills([512, 512], [5.0; 2], 300.0).tiled([977, 977]));
-    let mut technique = match form.entry.prepare(&field, &form.settings) {
+    let mut technique = match config.entry.prepare(&field, &config.settings) {
         Ok(technique) => technique,
-        Err(why) => return vec![Finding::reported("refused, saying why", 1.0).because(Some(why))],
+        Err(why) => return vec![Finding::reported("refused with a reason", 1.0).with_reason(Some(why))],
     };
     let tolerance = Tolerance { px: 16.0, metric: Metric::Certified };
     let views = paths::find("corner").expect("a named path").views(&field, FRAMES, [160, 90], tolerance);

@@ -1,4 +1,4 @@
-//! What the suite found, as rows: `stress.json`, and what the page is drawn from.
+//! Results of the stress suite as rows: the contents of `stress.json`, from which the report page is drawn.
 
 use std::path::Path;
 
@@ -8,66 +8,66 @@ use serde::{Deserialize, Serialize};
 /// Version of `stress.json`.
 pub const SCHEMA: u32 = 1;
 
-/// Name of the file in a suite's directory.
+/// File name in a suite's directory.
 pub const FILE: &str = "stress.json";
 
 /// One check of one case with one technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
+    /// Family: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: String,
-    /// The case.
+    /// Name of the case.
     pub name: String,
-    /// The technique with its settings, or what else was tried.
+    /// The technique with its settings, or the subject of a standalone case.
     pub technique: String,
-    /// What was checked, with its unit where it has one.
+    /// Name of the check, with its unit if it has one.
     pub check: String,
-    /// What was found; `null` if it is no finite number.
+    /// Measured value; `null` if it is not finite.
     pub value: Option<f64>,
-    /// The most that passes; `null` where the value is only told.
+    /// Largest value that passes; `null` if the value is only reported.
     pub limit: Option<f64>,
-    /// Whether the value is within the limit.
+    /// True if the value is within the limit.
     pub pass: bool,
-    /// How it failed.
+    /// Reason of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
-    /// The command that repeats it.
+    /// Command that repeats the check.
     pub repeat: String,
     /// Files of the counter-example.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub saved: Vec<String>,
 }
 
-/// A run of the suite.
+/// One run of the suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stress {
-    /// [`SCHEMA`].
+    /// Version of the file format, [`SCHEMA`].
     pub schema: u32,
     /// Version of the program.
     pub program: String,
-    /// The device that drew pictures, if there was one.
+    /// Device that drew images, if any.
     pub device: Option<String>,
-    /// Why not everything was tried, if so: it was stopped, or the device was lost.
+    /// Reason why the suite ended early: stopped, or device lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<String>,
     /// All rows.
     pub cases: Vec<Row>,
-    /// Pictures of what was measured: file and caption.
+    /// Images of measurements.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pictures: Vec<Picture>,
 }
 
-/// A picture beside the rows.
+/// An image beside the rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
-    /// Its file's name.
+    /// File name.
     pub file: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
 }
 
 impl Stress {
-    /// Reads a suite's directory.
+    /// Reads the results from a suite's directory.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
         let text = std::fs::read(&path).with_context(|| path.display().to_string())?;
@@ -76,7 +76,7 @@ impl Stress {
         Ok(stress)
     }
 
-    /// How many rows pass and how many fail; what is only told counts for neither.
+    /// Returns the numbers of passed and failed checks. Values without a limit are not counted.
     pub fn counts(&self) -> [usize; 2] {
         let judged = || self.cases.iter().filter(|row| row.limit.is_some());
         let passed = judged().filter(|row| row.pass).count();

@@ -1,5 +1,7 @@
-//! The budget controller on loads that are hard to hold, and where it is stable: slope of the cost over the tolerance
-//! against the delay of the costs, beside a fixed step and a pure proportion.
+//! Stiff loads: the budget controller on simulated loads that are hard to control.
+//!
+//! Also computes its stability region over cost slope and cost delay, compared with a fixed step and a proportional
+//! regulator.
 
 use std::io;
 use std::path::Path;
@@ -9,7 +11,7 @@ use anyhow::{Context, Result};
 use image::{ImageFormat, Rgb, RgbImage};
 use rayon::prelude::*;
 
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::rows::Picture;
 use super::simulated_loads::{
     COST, EVENT, FixedStep, Load, Proportional, Regulator, SimulatedFrame, constant, overshoot, power, settling, step,
@@ -23,49 +25,50 @@ use crate::lod::budget::{Controller, RANGE_PX, Target};
 use crate::view::{Metric, Tolerance};
 
 const fn case(name: &'static str, examine: fn() -> Vec<Finding>) -> Case {
-    Case { family: "stiff", name, kind: Kind::Alone("controller", examine) }
+    Case { family: "stiff", name, kind: Kind::Standalone("controller", examine) }
 }
 
 /// The family `stiff`.
 pub const CASES: &[Case] = &[
-    case("a step of the load", || judged(&[0.3, 0.5, 1.0, 2.0, 4.0], &[3.0, 1.0 / 3.0], 0.0)),
-    case("a step at slopes up to 1e4, once known", || judged(&[10.0, 100.0, 1e3, 1e4], &[3.0, 1.0 / 3.0], 0.0)),
+    case("a step of the load", || step_response(&[0.3, 0.5, 1.0, 2.0, 4.0], &[3.0, 1.0 / 3.0], 0.0)),
+    case("a step at slopes up to 1e4, once known", || step_response(&[10.0, 100.0, 1e3, 1e4], &[3.0, 1.0 / 3.0], 0.0)),
     case("a start at slopes up to 1e4, not known", unknown_slopes),
-    case("a step under 30 % noise", || judged(&[0.5, 1.0, 2.0, 4.0], &[3.0, 1.0 / 3.0], 0.3)),
+    case("a step under 30 % noise", || step_response(&[0.5, 1.0, 2.0, 4.0], &[3.0, 1.0 / 3.0], 0.3)),
     case("a ramp and a swing", slow_changes),
     case("a single slow frame", impulse),
     case("a cliff in the cost", stairs),
-    case("nothing can be done for a while", saturation),
-    case("1000 made-up renderers", many),
-    Case { family: "stiff", name: "a circle over three fields", kind: Kind::Each(real) },
+    case("controller saturated for a while", saturation),
+    case("1000 simulated loads", random_loads),
+    Case { family: "stiff", name: "a circle over three fields", kind: Kind::PerTechnique(real_terrain) },
 ];
 
-/// What is asked of it (a share of the target, and frames).
+/// Limits: overshoot relative to the target, and settling time in frames.
 const OVERSHOOT: f64 = 0.2;
 const SETTLING: f64 = 15.0;
 const DELAYS: [usize; 3] = [1, 2, 3];
-/// Seeds of noise for each load.
+/// Noise seeds per load.
 const SEEDS: u64 = 100;
 
-/// Triangles are counted exactly; times are noisy.
+/// Returns a target of triangles (counted exactly), or of frame time if the load is noisy.
 fn target(noise: f64) -> Target {
     if noise > 0.0 { Target::FrameMs(COST) } else { Target::Triangles(COST) }
 }
 
-/// The overshoot of frames after the load's change could be known.
+/// Returns the overshoot of the frames after the load's change became known.
 fn overshoot_after(frames: &[SimulatedFrame], delay: usize) -> f64 {
     overshoot(&frames[EVENT + delay + 1..])
 }
 
-fn judged(slopes: &[f64], factors: &[f64], noise: f64) -> Vec<Finding> {
+/// Checks overshoot and settling after a step of the load, for all slopes, step factors and delays.
+fn step_response(slopes: &[f64], factors: &[f64], noise: f64) -> Vec<Finding> {
     let (share, seeds) = if noise > 0.0 { (0.2, SEEDS) } else { (0.05, 1) };
     let loads = slopes.iter().flat_map(|s| factors.iter().flat_map(move |f| DELAYS.map(|delay| (*s, *f, delay))));
     let mut worst = [[0.0f64; 2]; 2];
     for (slope, factor, delay) in loads {
         let of_seed = |seed: u64| {
             let load = Load { curve: &power(slope), factor: &step(factor), delay, noise, seed };
-            // Beside the target at first, so that it meets the slope before the load changes.
-            let frames = load.fly(target(noise), (-0.5 / slope).exp(), 2 * EVENT + 40);
+            // Starts off target, so that the controller learns the slope before the load changes.
+            let frames = load.run(target(noise), (-0.5 / slope).exp(), 2 * EVENT + 40);
             [overshoot_after(&frames, delay), settling(&frames[EVENT..], share) as f64]
         };
         let (overshoots, settlings): (Vec<_>, Vec<_>) =
@@ -88,18 +91,18 @@ fn judged(slopes: &[f64], factors: &[f64], noise: f64) -> Vec<Finding> {
     findings
 }
 
-/// Median, and what 95 % are within.
+/// Returns the median and the 95 % quantile.
 fn quantiles(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     [values[values.len() / 2], values[values.len() * 95 / 100]]
 }
 
-/// It takes a slope for a common one at first.
+/// Checks settling from a start with an unknown, steep slope; the controller assumes a common slope at first.
 fn unknown_slopes() -> Vec<Finding> {
     let found = |delay: usize| {
         let of_slope = |slope: f64| {
             let load = Load { curve: &power(slope), factor: &constant, delay, noise: 0.0, seed: 0 };
-            settling(&load.fly(target(0.0), (-0.5 / slope).exp(), 160), 0.05)
+            settling(&load.run(target(0.0), (-0.5 / slope).exp(), 160), 0.05)
         };
         [10.0, 100.0, 1e3, 1e4].map(of_slope).into_iter().max().unwrap_or(0) as f64
     };
@@ -110,13 +113,14 @@ fn unknown_slopes() -> Vec<Finding> {
     ]
 }
 
-/// 2 % a frame, and a swing of 30 % in 40 frames: off by no more than what changes until a cost is known.
+/// Checks a ramp of 2 % per frame and an oscillation of 30 % in 40 frames. The error must stay within the change
+/// during the delay.
 fn slow_changes() -> Vec<Finding> {
     let ramp = |k: usize| 1.02f64.powi(k.clamp(EVENT, 2 * EVENT) as i32 - EVENT as i32);
     let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
     let worst = |factor: &(dyn Fn(usize) -> f64 + Sync)| {
         let off = |delay: usize| {
-            let frames = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 }.fly(target(0.0), 1.0, 240);
+            let frames = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 }.run(target(0.0), 1.0, 240);
             frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max)
         };
         DELAYS.map(off).into_iter().fold(0.0, f64::max)
@@ -127,22 +131,23 @@ fn slow_changes() -> Vec<Finding> {
     ]
 }
 
+/// Checks that a single slow or fast frame does not change the tolerance.
 fn impulse() -> Vec<Finding> {
     let moves = |(delay, spike): (usize, f64)| {
         let factor = move |k: usize| if k == EVENT { spike } else { 1.0 };
         let load = Load { curve: &power(1.5), factor: &factor, delay, noise: 0.0, seed: 0 };
-        let frames = load.fly(target(0.0), 1.0, 100);
+        let frames = load.run(target(0.0), 1.0, 100);
         frames.iter().filter(|frame| frame.px != frames[EVENT].px).count()
     };
     let all = DELAYS.into_iter().flat_map(|delay| [(delay, 5.0), (delay, 0.2)]);
     vec![Finding::within("frames with another tolerance", all.map(moves).sum::<usize>() as f64, 0.0)]
 }
 
-/// The target lies between two stairs: it rests on the cheap one, close to the edge.
+/// Checks a target between two steps of the cost: the controller must rest on the cheaper step, close to the edge.
 fn stairs() -> Vec<Finding> {
     let stairs = |px: f64| 0.7 * COST * 4f64.powf(-(px.log2() / 2.0).floor());
     let last = |delay: usize| {
-        let frames = Load { curve: &stairs, factor: &constant, delay, noise: 0.0, seed: 5 }.fly(target(0.0), 7.0, 400);
+        let frames = Load { curve: &stairs, factor: &constant, delay, noise: 0.0, seed: 5 }.run(target(0.0), 7.0, 400);
         let tail = &frames[200..];
         let changes = tail.windows(2).filter(|pair| pair[0].cost != pair[1].cost).count();
         [changes as f64, tail.iter().map(|frame| frame.cost).fold(0.0, f64::max)]
@@ -155,14 +160,14 @@ fn stairs() -> Vec<Finding> {
     ]
 }
 
-/// Far too dear or far too cheap for 120 frames, then as before: τ stays in its range and is back soon.
+/// Checks a load out of range for 120 frames. The tolerance must stay in its range and return soon after.
 fn saturation() -> Vec<Finding> {
     let mut outside = 0;
     let mut back = 0;
     for (delay, factor) in DELAYS.into_iter().flat_map(|delay| [(delay, 1e4), (delay, 1e-4)]) {
         let factor = move |k: usize| if (EVENT..3 * EVENT).contains(&k) { factor } else { 1.0 };
         let frames =
-            Load { curve: &power(1.0), factor: &factor, delay, noise: 0.0, seed: 0 }.fly(target(0.0), 1.0, 300);
+            Load { curve: &power(1.0), factor: &factor, delay, noise: 0.0, seed: 0 }.run(target(0.0), 1.0, 300);
         let range = RANGE_PX[0] * 0.999_999..=RANGE_PX[1] * 1.000_001;
         outside += frames.iter().filter(|frame| !range.contains(&frame.px)).count();
         back = back.max(settling(&frames[3 * EVENT..], 0.05));
@@ -173,24 +178,24 @@ fn saturation() -> Vec<Finding> {
     ]
 }
 
-/// Random slopes, starts, steps, delays and noise: the shares that overshoot or settle late, and those of the two simpler
-/// regulators.
-fn many() -> Vec<Finding> {
+/// Checks random slopes, starts, steps, delays and noise: shares of loads that overshoot or settle late, also for the
+/// two simpler regulators.
+fn random_loads() -> Vec<Finding> {
     const LOADS: u64 = 1000;
     let share = |make: &(dyn Fn(Target, f64) -> Box<dyn Regulator> + Sync)| {
-        let of_plant = |seed: u64| {
+        let of_load = |seed: u64| {
             let random = |k: u64| f64::from(synth::noise::hash(seed as i64, k as i64, 11)) / f64::from(u32::MAX);
             let slope = 10f64.powf(-0.5 + 1.2 * random(0));
             let (factor, delay) = (10f64.powf(random(1) - 0.5), 1 + (2.999 * random(2)) as usize);
             let noise = if seed.is_multiple_of(2) { 0.0 } else { 0.3 * random(3) };
             let load = Load { curve: &power(slope), factor: &step(factor), delay, noise, seed };
             let mut regulator = make(target(noise), 1.0);
-            let frames = load.fly_with(regulator.as_mut(), target(noise), 2 * EVENT + 40);
+            let frames = load.run_with(regulator.as_mut(), target(noise), 2 * EVENT + 40);
             let settled = settling(&frames[EVENT..], if noise > 0.0 { 0.2 } else { 0.05 }) as f64;
             [overshoot_after(&frames, delay) <= OVERSHOOT, settled <= SETTLING].map(u64::from)
         };
         let [held, settled] =
-            (0..LOADS).into_par_iter().map(of_plant).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            (0..LOADS).into_par_iter().map(of_load).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         [held, settled].map(|n| 1.0 - n as f64 / LOADS as f64)
     };
     let controller = share(&|target, px| Box::new(Controller::new(target, px, RANGE_PX)));
@@ -209,10 +214,10 @@ fn many() -> Vec<Finding> {
 /// Frames of the circle.
 const CIRCLE: usize = 1000;
 
-/// The controller holds half of a technique's triangles along a circle over three fields.
-fn real(form: &Form) -> Vec<Finding> {
-    // Variants differ in how the same triangles are submitted.
-    if form.variant.is_some() {
+/// Controls half of a technique's triangles along a circle over three fields.
+fn real_terrain(config: &TechniqueConfig) -> Vec<Finding> {
+    // Variants submit the same triangles in another way.
+    if config.variant.is_some() {
         return Vec::new();
     }
     let fields = [
@@ -221,16 +226,18 @@ fn real(form: &Form) -> Vec<Finding> {
         (synth::Kind::Peers, "noise: frames within 5 %", "noise: overshoot"),
     ];
     let of_field = |(kind, within, overshoot): (synth::Kind, &'static str, &'static str)| {
-        let Some([share, max]) = held(form, Arc::new(synth::synth(kind, [513, 513], 3))) else { return Vec::new() };
+        let Some([share, max]) = circle_at_half_budget(config, Arc::new(synth::synth(kind, [513, 513], 3))) else {
+            return Vec::new();
+        };
         vec![Finding::reported(within, share), Finding::reported(overshoot, max)]
     };
     fields.into_par_iter().flat_map_iter(of_field).collect()
 }
 
-/// The share of frames within 5 % of the target after settling, and the largest overshoot then; `None` if the tolerance
-/// changes nothing.
-fn held(form: &Form, field: Arc<Field>) -> Option<[f64; 2]> {
-    let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
+/// Returns the share of frames within 5 % of the target after settling, and the largest overshoot; `None` if the
+/// tolerance has no effect.
+fn circle_at_half_budget(config: &TechniqueConfig, field: Arc<Field>) -> Option<[f64; 2]> {
+    let mut technique = (config.entry.build)(Arc::clone(&field), &config.settings);
     let view = |px: f64| Tolerance { px, metric: Metric::Certified };
     let views = paths::find("circle").expect("a named path").views(&field, CIRCLE, [640, 360], view(1.0));
     let mut triangles = |frame: usize, px: f64| {
@@ -256,14 +263,14 @@ fn held(form: &Form, field: Arc<Field>) -> Option<[f64; 2]> {
     Some([within as f64 / settled.len() as f64, overshoot])
 }
 
-/// Slopes from 1/4 to 1e4, and delays of 1 to 12 frames: how soon a step of the load is settled, for each regulator. White:
-/// within 15 frames; yellow to red: later; black: never.
+/// Saves a stability map for each regulator, over slopes from 1/4 to 1e4 and delays of 1 to 12 frames: the settling
+/// time after a step of the load. White: within 15 frames; yellow to red: later; black: never.
 pub fn save_regions(folder: &Path) -> Result<Vec<Picture>> {
     const COLUMNS: u32 = 24;
     const ROWS: u32 = 12;
     const CELL: u32 = 12;
-    type Make = fn(Target, f64) -> Box<dyn Regulator>;
-    let regulators: [(&str, Make); 3] = [
+    type MakeRegulator = fn(Target, f64) -> Box<dyn Regulator>;
+    let regulators: [(&str, MakeRegulator); 3] = [
         ("controller", |target, px| Box::new(Controller::new(target, px, RANGE_PX))),
         ("fixed-step", |target, px| Box::new(FixedStep::new(target, px))),
         ("proportional", |target, px| Box::new(Proportional::new(target, px))),
@@ -273,7 +280,7 @@ pub fn save_regions(folder: &Path) -> Result<Vec<Picture>> {
     for (name, make) in regulators {
         let cells: Vec<_> = (0..COLUMNS * ROWS)
             .into_par_iter()
-            .map(|cell| settled(slope(cell % COLUMNS), cell / COLUMNS, make))
+            .map(|cell| settling_time(slope(cell % COLUMNS), cell / COLUMNS, make))
             .collect();
         let colour = |x: u32, y: u32| shade(cells[((ROWS - 1 - y / CELL) * COLUMNS + x / CELL) as usize]);
         let file = format!("stability-{name}.png");
@@ -292,14 +299,15 @@ pub fn save_regions(folder: &Path) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
-/// Frames until a load three times as large is held within 5 %; `None` if it never is.
-fn settled(slope: f64, delay: u32, make: fn(Target, f64) -> Box<dyn Regulator>) -> Option<usize> {
+/// Returns the frames until a threefold load is within 5 % of the target; `None` if it never is.
+fn settling_time(slope: f64, delay: u32, make: fn(Target, f64) -> Box<dyn Regulator>) -> Option<usize> {
     const FRAMES: usize = 300;
     let load = Load { curve: &power(slope), factor: &step(3.0), delay: delay as usize + 1, noise: 0.0, seed: 0 };
-    let frames = load.fly_with(make(target(0.0), (-0.5 / slope).exp()).as_mut(), target(0.0), EVENT + FRAMES);
+    let frames = load.run_with(make(target(0.0), (-0.5 / slope).exp()).as_mut(), target(0.0), EVENT + FRAMES);
     Some(settling(&frames[EVENT..], 0.05)).filter(|&settled| settled < FRAMES - 20)
 }
 
+/// Returns the colour of a settling time.
 fn shade(settled: Option<usize>) -> Rgb<u8> {
     match settled {
         None => Rgb([0, 0, 0]),

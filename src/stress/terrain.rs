@@ -1,9 +1,9 @@
-//! A field looked at from views: the laws, the error in numbers, and the numbers themselves.
+//! Checks a field from several views: invariants, screen error and validity of all numbers.
 
 use std::sync::Arc;
 
 use super::Finding;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::invariants::{INVARIANTS, SLACK, Subject, TOLERANCES_PX, Violation};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -14,19 +14,19 @@ use crate::lod::Technique;
 use crate::measure::geometric;
 use crate::view::View;
 
-/// A field and where it is looked at from.
+/// A field with views.
 pub struct StressTerrain {
     /// The field.
     pub field: Arc<Field>,
-    /// Views and their names.
+    /// Names and views.
     pub views: Vec<(&'static str, View)>,
 }
 
-/// Holds a technique on a land against every law.
-pub fn examine(terrain: &StressTerrain, form: &Form) -> Vec<Finding> {
-    let mut technique = match form.entry.prepare(&terrain.field, &form.settings) {
+/// Checks a technique on a terrain against every invariant.
+pub fn examine(terrain: &StressTerrain, config: &TechniqueConfig) -> Vec<Finding> {
+    let mut technique = match config.entry.prepare(&terrain.field, &config.settings) {
         Ok(technique) => technique,
-        Err(why) => return vec![Finding::reported("refused, saying why", 1.0).because(Some(why))],
+        Err(why) => return vec![Finding::reported("refused with a reason", 1.0).with_reason(Some(why))],
     };
     let mut subject = Subject {
         field: &terrain.field,
@@ -35,15 +35,15 @@ pub fn examine(terrain: &StressTerrain, form: &Form) -> Vec<Finding> {
         tolerances_px: &TOLERANCES_PX,
         time_s: 0.0,
     };
-    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(form.entry.name));
+    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(config.entry.name));
     let mut findings: Vec<_> =
         invariants.map(|invariant| Finding::holds(invariant.name, (invariant.check)(&mut subject))).collect();
-    findings.extend(in_numbers(&mut subject));
+    findings.extend(error_and_numbers(&mut subject));
     findings
 }
 
-/// The largest error of all views over the tolerance, and how many numbers are none.
-fn in_numbers(subject: &mut Subject) -> Vec<Finding> {
+/// Returns the largest screen error relative to the tolerance, and the check of all numbers.
+fn error_and_numbers(subject: &mut Subject) -> Vec<Finding> {
     let (mut error, mut at, mut numbers) = (0.0, None, Ok(()));
     for &named in subject.views {
         let (_, view) = named;
@@ -64,7 +64,8 @@ fn in_numbers(subject: &mut Subject) -> Vec<Finding> {
     vec![Finding { violation: at, ..error }, Finding::holds("no NaN, no subnormal, weights in [0, 1]", numbers)]
 }
 
-/// Whether every number that reaches a vertex is one: finite, not subnormal, weights of instances in [0, 1].
+/// Checks that every number that reaches a vertex is finite and not subnormal, and that instance weights are in [0,
+/// 1].
 pub fn all_numbers(field: &Field, technique: &dyn Technique, view: &View, list: &DrawList) -> Result<(), String> {
     if let Some(instance) = list.instances.iter().find(|instance| !has_weights(instance)) {
         return Err(format!("{:x?} of the instance at {:?}", instance.weights(), instance.origin));
@@ -74,7 +75,7 @@ pub fn all_numbers(field: &Field, technique: &dyn Technique, view: &View, list: 
     expand::visit_triangles(field, &frame, technique.resident(), list, |triangle| {
         for corner in triangle.corners {
             let relative = crate::draw::place::relative_position(&frame, [corner.x, corner.z], corner.y);
-            if !relative.into_iter().chain([corner.y]).all(is_plain) {
+            if !relative.into_iter().chain([corner.y]).all(is_zero_or_normal) {
                 wrong = Some(format!("corner ({}, {}) is drawn at {relative:?}", corner.x, corner.z));
             }
         }
@@ -82,11 +83,11 @@ pub fn all_numbers(field: &Field, technique: &dyn Technique, view: &View, list: 
     wrong.map_or(Ok(()), Err)
 }
 
-fn is_plain(number: f32) -> bool {
+fn is_zero_or_normal(number: f32) -> bool {
     number == 0.0 || number.is_normal()
 }
 
-/// True if an instance's weights are in [0, 1], on sides in [0, 2], flags left out.
+/// Returns true if the weight bytes of an instance are in [0, 1], those of its sides in [0, 2], without flags.
 fn has_weights(instance: &Instance) -> bool {
     let all = |word: u32, max: u32| word.to_le_bytes().into_iter().all(|byte| u32::from(byte) <= max);
     let unflagged = |word: u32| word & !(0x0101_0101 * FINER);

@@ -1,10 +1,10 @@
-//! Time that stands still, creeps, leaps or turns back, and a viewer who does.
+//! Scene time that stops, creeps, jumps or runs backwards, and cameras that oscillate.
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::fields::hills;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::{Case, Finding, Flight, Kind, views};
 use crate::bench::paths::{self, TIME_STEP_S};
 use crate::draw::expand;
@@ -22,10 +22,10 @@ pub const CASES: &[Case] = &[
     case("no time between frames", || flown("circle", |_| 0.0)),
     case("1 microsecond between frames", || flown("circle", |frame| 1e-6 * frame as f64)),
     case("10 s between frames", || flown("circle", |frame| 10.0 * frame as f64)),
-    case("time that leaps and goes back", || flown("skim", |frame| if frame % 3 == 0 { 1e6 } else { -5.0 })),
+    case("time jumps forwards and backwards", || flown("skim", |frame| if frame % 3 == 0 { 1e6 } else { -5.0 })),
     case("back again in mid-morph", there_and_back),
     case("a teleport each frame", || flown("teleport", |frame| TIME_STEP_S * frame as f64)),
-    Case { family: "time", name: "back and forth across a threshold", kind: Kind::Each(oscillation) },
+    Case { family: "time", name: "back and forth across a threshold", kind: Kind::PerTechnique(oscillation) },
 ];
 
 /// Frames of a flight.
@@ -40,7 +40,7 @@ fn path(field: &Field, name: &str, frames: usize) -> Vec<View> {
     paths::find(name).expect("a named path").views(field, frames, [320, 180], tolerance)
 }
 
-/// A named path with times of its own, seconds by frame.
+/// Returns a named path with custom scene times, seconds by frame.
 fn flown(name: &str, time_s: fn(usize) -> f64) -> Flight {
     let field = Arc::new(terrain());
     let views = path(&field, name, FRAMES);
@@ -48,7 +48,7 @@ fn flown(name: &str, time_s: fn(usize) -> f64) -> Flight {
     Flight { views, field }
 }
 
-/// A few steps of a fine flight forth, and the same back, again and again.
+/// Returns a flight of six short steps forwards and backwards, repeated.
 fn there_and_back() -> Flight {
     let field = Arc::new(terrain());
     let fine = path(&field, "circle", 40 * FRAMES);
@@ -59,22 +59,22 @@ fn there_and_back() -> Flight {
     Flight { views: (0..2 * FRAMES).map(frame).collect(), field }
 }
 
-/// Times that the viewer crosses the threshold.
+/// Number of threshold crossings.
 const CROSSINGS: usize = 12;
 
-/// A viewer who swings across a threshold: the mesh changes once a crossing at most, and with a slow clock not even that.
-fn oscillation(form: &Form) -> Vec<Finding> {
+/// Moves the camera back and forth across a threshold. The mesh may change at most once per crossing.
+fn oscillation(config: &TechniqueConfig) -> Vec<Finding> {
     let field = Arc::new(terrain());
-    let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
+    let mut technique = (config.entry.build)(Arc::clone(&field), &config.settings);
     let all = views::views(&field);
-    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
+    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a common view").1;
     let (near, far) = (of("from above a corner"), of("far outside"));
     let Some([before, behind]) = views::threshold(&field, &mut *technique, near, far.eye) else {
         return vec![Finding::reported("every list is the same", 1.0)];
     };
-    // A hair to both sides, a frame each.
-    let hair = (behind.eye - near.eye) * 1e-9;
-    let sides = [View { eye: before.eye - hair, ..before }, View { eye: behind.eye + hair, ..behind }];
+    // Views just before and behind the threshold, one frame each.
+    let margin = (behind.eye - near.eye) * 1e-9;
+    let sides = [View { eye: before.eye - margin, ..before }, View { eye: behind.eye + margin, ..behind }];
     let meshes: Vec<_> = (0..=CROSSINGS)
         .map(|k| mesh(&field, &mut *technique, &View { time_s: TIME_STEP_S * k as f64, ..sides[k % 2] }))
         .collect();
@@ -86,7 +86,7 @@ fn oscillation(form: &Form) -> Vec<Finding> {
     ]
 }
 
-/// Where triangles of the next list have their corners, whatever the heights.
+/// Returns the lattice corners of the next list's triangles, without heights, sorted.
 fn mesh(field: &Field, technique: &mut dyn Technique, view: &View) -> Vec<[[i32; 2]; 3]> {
     let mut list = crate::draw::DrawList::default();
     technique.select(view, &mut list);

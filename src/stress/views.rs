@@ -1,11 +1,11 @@
-//! Views of a field: those that the laws are tried on, and extreme ones.
+//! Common views of a field, in which invariants are checked, and extreme ones.
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
 use super::fields::hills;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
 use super::{Case, Finding, Kind, StressTerrain};
 use crate::height::Field;
@@ -16,8 +16,8 @@ const fn case(name: &'static str, terrain: fn() -> StressTerrain) -> Case {
     Case { family: "view", name, kind: Kind::Terrain(terrain) }
 }
 
-/// The family `view`. Straight down, upside down, rolled, parallel, under the land and exactly on a vertex are views of
-/// every land ([`views`]).
+/// The family `view`. Views straight down, upside down, rolled, orthographic, under the terrain and exactly on a
+/// vertex are common views of every terrain ([`views`]).
 pub const CASES: &[Case] = &[
     case("every common view", || extreme(|view| view)),
     case("half a degree wide", || extreme(|view| wide(view, 0.5))),
@@ -25,21 +25,21 @@ pub const CASES: &[Case] = &[
     case("near plane at 1 mm", || extreme(|view| View { near: 1e-3, ..view })),
     case("1 x 1 pixels", || extreme(|view| View { size: [1, 1], ..view })),
     case("16384 x 1 pixels", || extreme(|view| View { size: [16384, 1], ..view })),
-    Case { family: "view", name: "exactly on a threshold", kind: Kind::Each(on_a_threshold) },
+    Case { family: "view", name: "exactly on a threshold", kind: Kind::PerTechnique(on_a_threshold) },
 ];
 
-/// The land of this family.
+/// The terrain of this family.
 fn terrain() -> Field {
     hills([129, 97], [10.0; 2], 400.0)
 }
 
-/// Its common views, changed.
+/// Returns the terrain with modified common views.
 fn extreme(change: fn(View) -> View) -> StressTerrain {
     let field = Arc::new(terrain());
     StressTerrain { views: views(&field).into_iter().map(|(name, view)| (name, change(view))).collect(), field }
 }
 
-/// As wide; parallel rays stay.
+/// Returns a view with another field of view; orthographic views are unchanged.
 fn wide(view: View, degrees: f64) -> View {
     match view.lens {
         Lens::Perspective { .. } => View { lens: Lens::Perspective { fov_x: degrees.to_radians() }, ..view },
@@ -47,13 +47,13 @@ fn wide(view: View, degrees: f64) -> View {
     }
 }
 
-/// The last eye from which one list is drawn and the first from which another is, next to each other as numbers are, on
-/// the way from above a corner to far away: every law on both sides.
-fn on_a_threshold(form: &Form) -> Vec<Finding> {
+/// Checks every invariant at the two adjacent eye positions between which the list changes, on the way from above a
+/// corner to far away.
+fn on_a_threshold(config: &TechniqueConfig) -> Vec<Finding> {
     let field = Arc::new(terrain());
-    let mut technique = (form.entry.build)(Arc::clone(&field), &form.settings);
+    let mut technique = (config.entry.build)(Arc::clone(&field), &config.settings);
     let all = views(&field);
-    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
+    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a common view").1;
     let (near, far) = (of("from above a corner"), of("far outside"));
     let Some(sides) = threshold(&field, &mut *technique, near, far.eye) else {
         return vec![Finding::reported("every list is the same", 1.0)];
@@ -66,12 +66,12 @@ fn on_a_threshold(form: &Form) -> Vec<Finding> {
         tolerances_px: &TOLERANCES_PX,
         time_s: 0.0,
     };
-    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(form.entry.name));
+    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(config.entry.name));
     invariants.map(|invariant| Finding::holds(invariant.name, (invariant.check)(&mut subject))).collect()
 }
 
-/// The view and its eye moved towards `end`, halved until nothing lies between two that draw differently many triangles;
-/// `None` if both ends draw as many.
+/// Bisects the path of the eye towards `end` until two adjacent positions (in f64) draw different numbers of
+/// triangles. Returns `None` if both ends draw the same number.
 pub fn threshold(field: &Field, technique: &mut dyn Technique, view: View, end: DVec3) -> Option<[View; 2]> {
     let mut subject = Subject { field, technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
     let way = end - view.eye;
@@ -92,12 +92,12 @@ pub fn threshold(field: &Field, technique: &mut dyn Technique, view: View, end: 
     Some([at(low), at(high)])
 }
 
-/// The view with another tolerance, certified.
+/// Returns the view with another tolerance, pixels, under the certified metric.
 pub fn with_tolerance(view: &View, px: f64) -> View {
     View { tolerance: Tolerance { px, metric: Metric::Certified }, ..*view }
 }
 
-/// Views of a field, near and far from it and far from each other: from one to the next is a teleport.
+/// Returns named views near the field and far from it; each step from one to the next is a teleport.
 pub fn views(field: &Field) -> Vec<(&'static str, View)> {
     let [w, h] = field.size().map(f64::from);
     let (low, high) = (field.world_at(0.0, 0.0, 0.0), field.world_at(w - 1.0, h - 1.0, 0.0));
@@ -119,7 +119,7 @@ pub fn views(field: &Field) -> Vec<(&'static str, View)> {
         ("from above a corner", pinhole(corner, towards(corner), 60.0)),
         ("far outside", pinhole(far, towards(far), 30.0)),
         ("straight down", pinhole(above, View::turned(90.0, -90.0, 0.0), 75.0)),
-        ("from under the land", pinhole(under, View::turned(0.0, 60.0, 20.0), 100.0)),
+        ("from under the terrain", pinhole(under, View::turned(0.0, 60.0, 20.0), 100.0)),
         ("5°", pinhole(corner, towards(corner), 5.0)),
         ("120°, upside down", pinhole(at(0.2, 0.3, extent / 15.0), View::turned(45.0, -30.0, 180.0), 120.0)),
         ("orthographic", orthographic(corner, towards(corner), extent / 2.0)),
@@ -139,7 +139,7 @@ fn orthographic(eye: DVec3, world_from_eye: DMat3, width: f64) -> View {
     View { lens: Lens::Orthographic { width, far: 1e9 }, ..view }
 }
 
-/// Whether all samples are in the frustum for certain.
+/// Returns true if all samples are certainly in the frustum.
 pub fn sees_everything(field: &Field, view: &View) -> bool {
     let [w, h] = field.size().map(|n| f64::from(n - 1));
     let range = field.statistics();

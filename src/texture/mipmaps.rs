@@ -1,18 +1,18 @@
-//! Mipmap levels of a picture of any size, filtered by area in linear light.
+//! Builds mip levels of images of any size, area-filtered in linear light.
 
 use rayon::prelude::*;
 
 use super::overlay_pyramid::{Picture, Texel, coded, linear};
 
-/// The texels along an axis that one of the next level covers: the first, and by how much each.
+/// The texels along an axis that one texel of the next level covers: index of the first, and a weight for each.
 #[derive(Clone, Copy)]
 struct Covered {
     first: usize,
     weights: [f32; 4],
 }
 
-/// Makes the next level: half the sides, rounded down, at least one texel. A texel is the mean of those it covers. Where a
-/// side is odd it covers some of them in part, so that no texel counts for less than its area.
+/// Returns the next mip level: size and texels. Sides are halved and rounded down, at least 1. A texel is the mean of
+/// the area it covers; where a side is odd, texels on the border of that area count in part.
 pub fn halved(picture: Picture) -> ([u32; 2], Vec<Texel>) {
     let size = picture.size.map(|n| (n / 2).max(1));
     let [columns, rows] = [0, 1].map(|k| covered(picture.size[k], size[k]));
@@ -33,7 +33,7 @@ pub fn halved(picture: Picture) -> ([u32; 2], Vec<Texel>) {
     (size, texels.collect())
 }
 
-/// The share of `count` texels that each of `fewer` covers; the weights add up to 1.
+/// Returns the coverage of `count` texels by each of `fewer` texels; the weights of each add up to 1.
 fn covered(count: u32, fewer: u32) -> Vec<Covered> {
     let length = f64::from(count) / f64::from(fewer);
     let of = |n: u32| {
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_texel_counts_for_its_area() {
+    fn every_texel_has_weight_proportional_to_its_area() {
         for count in [1, 2, 3, 5, 6, 7, 100, 1531, 14_001] {
             let fewer = (count / 2).max(1);
             let mut counted = vec![0.0; count as usize];
@@ -72,15 +72,15 @@ mod tests {
         }
     }
 
-    /// Fine black and white is grey in linear light, 188 of 255, whatever the sides.
+    /// A checkerboard of black and white averages to 188 of 255 in sRGB: half in linear light.
     #[test]
-    fn a_chequered_picture_becomes_grey() {
+    fn a_checkerboard_averages_to_linear_grey() {
         for size in [[64, 64], [61, 37], [3, 5], [2, 1]] {
             let colour = |k: u32| if (k % size[0] + k / size[0]).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
             let mut level = (size, (0..size[0] * size[1]).map(colour).collect::<Vec<Texel>>());
             level = halved(Picture { size: level.0, texels: &level.1 });
             assert_eq!(level.0, size.map(|n| (n / 2).max(1)));
-            // Where three texels become one, two of them may be white.
+            // Where three texels become one, one or two of them are white.
             let slack = if size[0].is_multiple_of(2) { 0 } else { 35 };
             assert!(
                 level.1.iter().all(|t| t[0].abs_diff(188) <= slack && t[3] == 255),
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn one_colour_stays_that_colour() {
+    fn a_uniform_image_stays_uniform() {
         let texels = vec![[200, 17, 90, 128]; 50 * 31];
         let (size, next) = halved(Picture { size: [50, 31], texels: &texels });
         assert_eq!((size, next.len()), ([25, 15], 375));

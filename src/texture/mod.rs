@@ -1,5 +1,6 @@
-//! Textures: those made at start, the same bytes on every machine; a picture cut into pages' maps; and which part of a map
-//! a frame needs, how fine, and texels for it.
+//! Textures, on the CPU: generated detail materials, overlay images, and the working sets of virtual textures.
+//!
+//! Everything generated here is bit-identical on every machine.
 
 pub mod detail;
 pub mod drape;

@@ -1,67 +1,66 @@
-//! A picture laid over pages: maps of descending resolution for each page, filtered over all of the picture first and cut
-//! into pages then.
+//! An overlay image as mip levels per page: filtered over the whole image first, then cut into square pages.
 //!
-//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8. Texels lie on a lattice, as heights do: a
-//! map has 2^n + 1 texels along a side, and its first and last ones are those of the pages beside it, at every level. So
-//! what a sampler makes of two maps of one level is the same along the edge between them, which filtering each page by
-//! itself would break. A level keeps every other texel of the one before, weighted 1 : 2 : 1 with its neighbours, in
+//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8. Texels lie on a lattice, as heights
+//! do: a page has 2^n + 1 texels along a side and shares its border texels with the adjacent pages, at every mip
+//! level. Two pages of one level therefore sample equally along their common edge; filtering each page on its own
+//! would break that. A level keeps every other texel of the finer one, weighted 1 : 2 : 1 with its neighbours, in
 //! linear light.
 
 use rayon::prelude::*;
 
-/// Red, green and blue as sRGB codes, and opacity.
+/// Red, green and blue as sRGB codes, and linear opacity.
 pub type Texel = [u8; 4];
 
-/// A picture, row by row.
+/// An RGBA image in memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture<'a> {
-    /// Texels along (x, z), at least one.
+    /// Texels along (x, z), at least 1.
     pub size: [u32; 2],
-    /// Row by row.
+    /// Texels, row by row.
     pub texels: &'a [Texel],
 }
 
-/// How pages lie under a picture.
+/// The grid of pages over an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Layout {
+pub struct PyramidLayout {
     /// Pages along (x, z).
     pub pages: [u32; 2],
-    /// Pages that the picture's sides are long: fewer than `pages` where the last ones stick out of the field.
+    /// Length of the image's sides in pages. Less than `pages` where the last page extends beyond the image.
     pub extent: [f64; 2],
-    /// True if the picture goes on from its start where it ends.
+    /// True, per axis, if the image wraps around.
     pub repeats: [bool; 2],
 }
 
-/// A page's map.
+/// One mip level of one page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Map {
-    /// The page's place (x, z).
+pub struct PageMip {
+    /// Page indices (x, z).
     pub page: [u32; 2],
-    /// 0 the finest.
+    /// Mip level, 0 the finest.
     pub level: u32,
 }
 
-/// One level of all pages together.
+/// One mip level of all pages in one image.
 struct MipLevel {
     size: [u32; 2],
     texels: Vec<Texel>,
 }
 
-/// All levels of all pages.
+/// All mip levels of all pages.
 pub struct OverlayPyramid {
-    layout: Layout,
+    layout: PyramidLayout,
     levels: Vec<MipLevel>,
 }
 
-/// The most cells along a side of a page's finest map.
+/// Upper limit of cells along a side of a page at mip level 0.
 const MAX_CELLS: u32 = 4096;
 
 impl OverlayPyramid {
-    /// Filters a picture. The finest maps are as fine as the picture, within 2^12 cells a side.
+    /// Filters an image. Mip level 0 is at least as fine as the image, up to 2^12 cells along a side of a page.
     ///
     /// # Panics
-    /// If the picture or the layout is empty, or repeats after something else than whole pages.
-    pub fn new(picture: Picture, layout: Layout) -> Self {
+    /// If the image or the layout is empty, or if the period along a repeating axis is not a whole number of pages.
+    pub fn new(picture: Picture, layout: PyramidLayout) -> Self {
         assert_eq!(picture.texels.len(), picture.size[0] as usize * picture.size[1] as usize);
         for k in 0..2 {
             assert!(picture.size[k] > 0 && layout.pages[k] > 0 && layout.extent[k] > 0.0, "an empty picture");
@@ -69,42 +68,43 @@ impl OverlayPyramid {
         }
         let needed = (0..2).map(|k| f64::from(picture.size[k]) / layout.extent[k]).fold(1.0, f64::max);
         let cells = (needed.ceil().min(f64::from(MAX_CELLS)) as u32).next_power_of_two();
-        let mut levels = vec![MipLevel::placed(picture, &layout, cells)];
+        let mut levels = vec![MipLevel::resampled(picture, &layout, cells)];
         for _ in 0..cells.ilog2() {
             levels.extend(levels.last().map(|finer| finer.halved(layout.repeats)));
         }
         Self { layout, levels }
     }
 
-    /// How pages lie.
-    pub fn layout(&self) -> &Layout {
+    /// Returns the grid of pages.
+    pub fn layout(&self) -> &PyramidLayout {
         &self.layout
     }
 
-    /// How many maps each page has; the coarsest is one cell.
+    /// Returns the number of mip levels of a page. The coarsest is one cell, or 2 × 2 texels.
     pub fn levels(&self) -> u32 {
         self.levels.len() as u32
     }
 
-    /// Texels along a side of a map.
+    /// Returns the texels along a side of a page at a mip level.
     pub fn side(&self, level: u32) -> u32 {
         self.cells(level) + 1
     }
 
+    /// Returns the cells along a side of a page at a mip level.
     fn cells(&self, level: u32) -> u32 {
         1 << (self.levels() - 1 - level)
     }
 
-    /// Bytes of a map.
+    /// Returns the bytes of a page at a mip level.
     pub fn bytes(&self, level: u32) -> u64 {
         u64::from(self.side(level)).pow(2) * size_of::<Texel>() as u64
     }
 
-    /// The texels of a map, row by row.
+    /// Returns the texels of a page at a mip level, row by row.
     ///
     /// # Panics
     /// If there is no such page or level.
-    pub fn cut(&self, Map { page, level }: Map) -> Vec<Texel> {
+    pub fn page_texels(&self, PageMip { page, level }: PageMip) -> Vec<Texel> {
         assert!((0..2).all(|k| page[k] < self.layout.pages[k]), "page {page:?}");
         let (of, side) = (&self.levels[level as usize], self.side(level) as usize);
         let [x, z] = page.map(|n| (n * self.cells(level)) as usize);
@@ -112,8 +112,8 @@ impl OverlayPyramid {
         (0..side).flat_map(|j| &of.texels[row(j)..row(j) + side]).copied().collect()
     }
 
-    /// As many texels as a page's finest map has, of a coarser level: those of 2^level × 2^level pages, from the `at`-th such
-    /// square on along each axis. Beyond the last page its last texels go on.
+    /// Returns a tile of constant size at a mip level: `side(0)`² texels, which cover 2^level × 2^level pages. `at`
+    /// is the index of that square of pages along (x, z). Beyond the last page its border texels repeat.
     ///
     /// # Panics
     /// If there is no such level.
@@ -125,10 +125,10 @@ impl OverlayPyramid {
 }
 
 impl MipLevel {
-    /// The picture at the lattice of the finest level, bilinearly between its texels' centres.
-    fn placed(picture: Picture, layout: &Layout, cells: u32) -> Self {
+    /// Resamples the image bilinearly to the lattice of mip level 0.
+    fn resampled(picture: Picture, layout: &PyramidLayout, cells: u32) -> Self {
         let size = layout.pages.map(|n| n * cells + 1);
-        // Between which two texels of the picture, and how far.
+        // The two image texels around a lattice position, and the weight of the second.
         let between = |k: usize, n: usize| {
             let count = picture.size[k] as i64;
             let t = n as f64 / f64::from(cells) / layout.extent[k] * count as f64 - 0.5;
@@ -147,10 +147,10 @@ impl MipLevel {
         Self { size, texels: rows.collect() }
     }
 
-    /// Every other texel, weighted 1 : 2 : 1 with those beside it along both axes.
+    /// Filters with weights 1 : 2 : 1 along both axes and keeps every other texel.
     fn halved(&self, repeats: [bool; 2]) -> Self {
         let size = self.size.map(|n| n / 2 + 1);
-        // The last texel is the first one again where the picture repeats, and has no other beyond it elsewhere.
+        // Where the image wraps around, its last texel equals its first; elsewhere the border repeats.
         let beside = |k: usize, n: i64| {
             let last = i64::from(self.size[k]) - 1;
             (if repeats[k] { n.rem_euclid(last) } else { n.clamp(0, last) }) as usize
@@ -172,25 +172,26 @@ fn mixed(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
     std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
 }
 
-/// Linear light by code (IEC 61966-2-1).
+/// Linear light of each sRGB code (IEC 61966-2-1).
 static LINEAR: std::sync::LazyLock<[f32; 256]> =
     std::sync::LazyLock::new(|| std::array::from_fn(|code| light(code as f32 / 255.0)));
 
+/// Decodes an sRGB component, 0 to 1, to linear light.
 fn light(c: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Linear light, and opacity.
+/// Decodes a texel to linear light and opacity, 0 to 1.
 pub(super) fn linear([r, g, b, a]: Texel) -> [f32; 4] {
     let light = |code: u8| LINEAR[usize::from(code)];
     [light(r), light(g), light(b), f32::from(a) / 255.0]
 }
 
-/// Light halfway between a code and the next one, by code.
+/// Linear light at the midpoint between each sRGB code and the next: the rounding thresholds.
 static HALFWAY: std::sync::LazyLock<[f32; 255]> =
     std::sync::LazyLock::new(|| std::array::from_fn(|code| light((code as f32 + 0.5) / 255.0)));
 
-/// The nearest codes.
+/// Encodes linear light and opacity to the nearest texel.
 pub(super) fn coded([r, g, b, a]: [f32; 4]) -> Texel {
     let code = |light: f32| HALFWAY.partition_point(|end| *end <= light) as u8;
     [code(r), code(g), code(b), (a * 255.0).round() as u8]
@@ -200,17 +201,17 @@ pub(super) fn coded([r, g, b, a]: [f32; 4]) -> Texel {
 mod tests {
     use super::*;
 
-    /// Neighbouring texels have nothing to do with each other.
+    /// Uncorrelated texels.
     fn noise(size: [u32; 2]) -> Vec<Texel> {
         (0..size[0] * size[1]).map(|k| (k.wrapping_mul(0x9e37_79b1) ^ k << 7).to_le_bytes()).collect()
     }
 
-    fn maps(size: [u32; 2], layout: Layout) -> OverlayPyramid {
+    fn pyramid(size: [u32; 2], layout: PyramidLayout) -> OverlayPyramid {
         OverlayPyramid::new(Picture { size, texels: &noise(size) }, layout)
     }
 
-    fn whole(pages: [u32; 2], repeats: bool) -> Layout {
-        Layout { pages, extent: pages.map(f64::from), repeats: [repeats; 2] }
+    fn whole(pages: [u32; 2], repeats: bool) -> PyramidLayout {
+        PyramidLayout { pages, extent: pages.map(f64::from), repeats: [repeats; 2] }
     }
 
     fn column(texels: &[Texel], side: u32, n: u32) -> Vec<Texel> {
@@ -221,25 +222,24 @@ mod tests {
         texels[(n * side) as usize..((n + 1) * side) as usize].to_vec()
     }
 
-    /// Maps of pages side by side have the same texels along the edge between them; around the end too, if the
-    /// picture repeats.
+    /// Adjacent pages have the same texels on their common edge; also around the end, if the image wraps around.
     #[test]
-    fn edges_are_equal_at_every_level() {
+    fn adjacent_pages_share_edge_texels_at_every_mip_level() {
         for repeats in [false, true] {
-            let maps = maps([61, 37], whole([4, 3], repeats));
-            assert_eq!((maps.levels(), maps.side(0)), (5, 17));
+            let pyramid = pyramid([61, 37], whole([4, 3], repeats));
+            assert_eq!((pyramid.levels(), pyramid.side(0)), (5, 17));
             let last = if repeats { [4, 3] } else { [3, 2] };
-            for level in 0..maps.levels() {
-                let side = maps.side(level);
+            for level in 0..pyramid.levels() {
+                let side = pyramid.side(level);
                 for (x, z) in (0..4).flat_map(|x| (0..3).map(move |z| (x, z))) {
-                    let own = maps.cut(Map { page: [x, z], level });
-                    assert_eq!(own.len() as u64 * 4, maps.bytes(level));
+                    let own = pyramid.page_texels(PageMip { page: [x, z], level });
+                    assert_eq!(own.len() as u64 * 4, pyramid.bytes(level));
                     if x < last[0] {
-                        let east = maps.cut(Map { page: [(x + 1) % 4, z], level });
+                        let east = pyramid.page_texels(PageMip { page: [(x + 1) % 4, z], level });
                         assert_eq!(column(&own, side, side - 1), column(&east, side, 0), "{x}, {z} at {level}");
                     }
                     if z < last[1] {
-                        let south = maps.cut(Map { page: [x, (z + 1) % 3], level });
+                        let south = pyramid.page_texels(PageMip { page: [x, (z + 1) % 3], level });
                         assert_eq!(row(&own, side, side - 1), row(&south, side, 0), "{x}, {z} at {level}");
                     }
                 }
@@ -247,75 +247,76 @@ mod tests {
         }
     }
 
-    /// Pages or one page over all: cutting changes nothing.
+    /// Dividing the image into pages does not change its filtered texels.
     #[test]
-    fn maps_are_the_filtered_picture_cut() {
+    fn pages_equal_the_filtered_image() {
         for repeats in [false, true] {
-            let (one, many) = (maps([64, 64], whole([1, 1], repeats)), maps([64, 64], whole([4, 4], repeats)));
+            let (one, many) = (pyramid([64, 64], whole([1, 1], repeats)), pyramid([64, 64], whole([4, 4], repeats)));
             for level in 0..many.levels() {
-                let (whole, cells, side) = (one.cut(Map { page: [0, 0], level }), many.cells(level), one.side(level));
+                let (whole, cells, side) =
+                    (one.page_texels(PageMip { page: [0, 0], level }), many.cells(level), one.side(level));
                 for page in (0..16).map(|k| [k % 4, k / 4]) {
-                    let map = many.cut(Map { page, level });
+                    let mip = many.page_texels(PageMip { page, level });
                     let around = |n: u32| [page[0] * cells + n % (cells + 1), page[1] * cells + n / (cells + 1)];
-                    let expected = (0..map.len() as u32).map(around).map(|[x, z]| whole[(z * side + x) as usize]);
-                    assert!(expected.eq(map), "page {page:?} at level {level}");
+                    let expected = (0..mip.len() as u32).map(around).map(|[x, z]| whole[(z * side + x) as usize]);
+                    assert!(expected.eq(mip), "page {page:?} at level {level}");
                 }
             }
         }
     }
 
-    /// A square of pages is their coarser maps side by side; those beside each other end in the same texels.
+    /// A tile consists of the coarser mips of its pages side by side; adjacent tiles share their edge texels.
     #[test]
-    fn a_tile_is_the_maps_of_its_pages() {
-        let maps = maps([61, 37], whole([4, 3], false));
-        let side = maps.side(0);
+    fn a_tile_consists_of_its_pages_at_its_mip_level() {
+        let pyramid = pyramid([61, 37], whole([4, 3], false));
+        let side = pyramid.side(0);
         for level in 0..3u32 {
-            let cells = maps.cells(level);
+            let cells = pyramid.cells(level);
             for (x, z) in (0..4 >> level).flat_map(|x| (0..3u32.div_ceil(1 << level)).map(move |z| (x, z))) {
-                let tile = maps.tile(level, [x, z]);
+                let tile = pyramid.tile(level, [x, z]);
                 for page in (0..4u32 << (2 * level) >> 2).map(|k| [k % (1 << level), k >> level]) {
                     let at = [(x << level) + page[0], (z << level) + page[1]];
                     if at[1] >= 3 {
                         continue;
                     }
-                    let map = maps.cut(Map { page: at, level });
+                    let mip = pyramid.page_texels(PageMip { page: at, level });
                     let of_tile = |n: usize| {
                         let (i, j) = (n as u32 % (cells + 1), n as u32 / (cells + 1));
                         tile[((page[1] * cells + j) * side + page[0] * cells + i) as usize]
                     };
-                    assert!((0..map.len()).all(|n| of_tile(n) == map[n]), "page {at:?} at level {level}");
+                    assert!((0..mip.len()).all(|n| of_tile(n) == mip[n]), "page {at:?} at level {level}");
                 }
                 if level < 2 && x + 1 < 4 >> level {
-                    assert_eq!(column(&tile, side, side - 1), column(&maps.tile(level, [x + 1, z]), side, 0));
+                    assert_eq!(column(&tile, side, side - 1), column(&pyramid.tile(level, [x + 1, z]), side, 0));
                 }
             }
         }
     }
 
-    /// What filtering each page by itself does at its edges would show here.
+    /// Fails if each page were filtered on its own.
     #[test]
-    fn a_bright_texel_reaches_the_page_beside_it() {
+    fn filtering_crosses_page_edges() {
         let mut texels = vec![[0, 0, 0, 255]; 64 * 64];
-        // Just east of the edge between pages, at whose lattice nothing of it is seen at level 1 without neighbours.
+        // A bright column just east of a page edge: at mip level 1 the edge sees it only through its neighbours.
         for z in 0..64 {
             texels[z * 64 + 33] = [255; 4];
         }
-        let maps = OverlayPyramid::new(Picture { size: [64, 64], texels: &texels }, whole([2, 2], false));
+        let pyramid = OverlayPyramid::new(Picture { size: [64, 64], texels: &texels }, whole([2, 2], false));
         for level in 1..4 {
-            let west = maps.cut(Map { page: [0, 0], level });
-            let at = column(&west, maps.side(level), maps.side(level) - 1);
+            let west = pyramid.page_texels(PageMip { page: [0, 0], level });
+            let at = column(&west, pyramid.side(level), pyramid.side(level) - 1);
             assert!(at.iter().all(|texel| texel[0] > 40), "level {level}: {at:?}");
         }
     }
 
-    /// One colour stays that colour: the picture's sides and what sticks out of it weigh nothing.
+    /// Image borders and the part of pages beyond the image do not change a uniform colour.
     #[test]
-    fn a_plain_picture_stays_plain() {
+    fn a_uniform_image_stays_uniform() {
         for extent in [[3.0, 2.0], [2.4, 1.3]] {
             let texels = vec![[200, 17, 90, 128]; 50 * 31];
-            let layout = Layout { pages: [3, 2], extent, repeats: [false; 2] };
-            let maps = OverlayPyramid::new(Picture { size: [50, 31], texels: &texels }, layout);
-            let all = maps.levels.iter().flat_map(|level| &level.texels);
+            let layout = PyramidLayout { pages: [3, 2], extent, repeats: [false; 2] };
+            let pyramid = OverlayPyramid::new(Picture { size: [50, 31], texels: &texels }, layout);
+            let all = pyramid.levels.iter().flat_map(|level| &level.texels);
             assert!(all.into_iter().all(|texel| *texel == texels[0]));
         }
     }

@@ -1,4 +1,4 @@
-//! Boxes around the terrain under the parts of a picture, and the size of a pixel there.
+//! Bounding boxes of the terrain under tiles of an overlay image, and the footprint of a pixel there.
 
 use glam::DVec3;
 
@@ -9,27 +9,28 @@ use crate::height::bounds::{Bounds, Measure};
 use crate::height::progress::Progress;
 use crate::view::{Aabb, Containment, Frustum, Lens, View};
 
-/// The terrain under a picture. Parts of it are squares of 2^`up` pages.
+/// Bounds of the terrain under an overlay image. A tile at `up` is a square of 2^`up` × 2^`up` pages; `at` is its
+/// index along (x, z).
 pub struct PictureBounds {
     origin: [f64; 2],
     spacing: [f64; 2],
-    /// The last sample of the field.
+    /// Index of the field's last sample along (x, z).
     last: [u32; 2],
     drape: Drape,
     /// Samples along the sides of a page.
     page: [f64; 2],
-    /// Texels between the sides of a part.
+    /// Texels, less one, along a side of a tile.
     cells: u32,
     heights: Bounds,
-    /// Heights over it where it has a ceiling.
+    /// Greatest height of the field's ceiling; −∞ if it has none.
     top: f32,
 }
 
 impl PictureBounds {
-    /// Measures the terrain under a picture that is cut into pages.
+    /// Computes the height bounds of the terrain under an image divided into pages.
     pub fn new(field: &Field, layout: &VirtualTextureLayout, drape: Drape) -> Self {
         let page = [0, 1].map(|k| drape.length[k] / layout.extent[k]);
-        // About a page long: any part then touches few squares.
+        // Squares about as long as a page: each tile then touches few of them.
         let cells = (page[0].max(page[1]).clamp(8.0, 4096.0) as u32).next_power_of_two();
         let measure = Measure { cells, growth: 1.0, errors: false, morph: false };
         Self {
@@ -44,15 +45,16 @@ impl PictureBounds {
         }
     }
 
-    /// Length of a texel of a part, metres.
+    /// Returns the length of a texel of a tile, metres.
     pub fn texel_m(&self, up: u32) -> f64 {
         let along = |k: usize| self.page[k] * self.spacing[k];
         along(0).max(along(1)) * f64::from(1u32 << up) / f64::from(self.cells)
     }
 
-    /// Size of a pixel, metres, at the nearest point of a part in sight and beyond the near plane; `None` if nothing of it is in sight.
+    /// Returns the size of a pixel, metres, at the nearest visible point of a tile beyond the near plane; `None` if
+    /// the tile is outside the frustum.
     ///
-    /// Of a part that lies over many tiles, those around the eye are tested. Further ones count as in sight.
+    /// On a tiled field only the copies around the eye are tested. Copies farther away count as visible.
     pub fn pixel_m(&self, up: u32, at: [u32; 2], view: &View, frustum: &Frustum) -> Option<f64> {
         let samples = self.samples(up, at)?;
         let range = self.range(samples)?;
@@ -61,27 +63,27 @@ impl PictureBounds {
         let boxes = boxes.filter_map(|tile| self.placed(samples, range, tile));
         let near = boxes.filter(|b| frustum.contains(b) != Containment::Outside).map(|b| b.distance(view.eye));
         let beyond = |k: usize| f64::from(self.drape.period[k].unwrap_or(0)) * self.spacing[k];
-        let second_target = [(more_x, beyond(0)), (more_z, beyond(1))].into_iter().filter(|(more, _)| *more);
-        let nearest = near.chain(second_target.map(|(_, m)| m)).reduce(f64::min)?;
+        let farther = [(more_x, beyond(0)), (more_z, beyond(1))].into_iter().filter(|(more, _)| *more);
+        let nearest = near.chain(farther.map(|(_, m)| m)).reduce(f64::min)?;
         Some(match view.lens {
             Lens::Perspective { .. } => nearest.max(view.near) / view.focal_px(),
             Lens::Orthographic { .. } => 1.0 / view.focal_px(),
         })
     }
 
-    /// The samples from one side of a part to the other, within the first tile; `None` if it lies beyond the field.
+    /// Returns the sample ranges under a tile within the first copy of the image; `None` beyond the field.
     fn samples(&self, up: u32, at: [u32; 2]) -> Option<[[f64; 2]; 2]> {
         let samples = [0, 1].map(|k| {
             let end = f64::from(self.drape.period[k].unwrap_or(self.last[k]));
             let side = |n: u32| self.drape.first[k] + f64::from(n << up) * self.page[k];
             let [low, high] = [side(at[k]), side(at[k] + 1).min(self.drape.first[k] + self.drape.length[k])];
-            // A picture that meets itself begins half a sample before its tile.
+            // An image that wraps around begins half a sample before its period.
             if self.drape.repeats()[k] { [low, high] } else { [low.clamp(0.0, end), high.clamp(0.0, end)] }
         });
         samples.iter().all(|[low, high]| low < high).then_some(samples)
     }
 
-    /// Lowest and highest sample of a part; `None` if there is no terrain.
+    /// Returns the lowest and highest height under a tile, metres; `None` if it has no terrain.
     fn range(&self, samples: [[f64; 2]; 2]) -> Option<[f32; 2]> {
         let period = |k: usize| self.drape.period[k].map_or(0.0, f64::from);
         let first = samples.map(|[low, _]| low.floor());
@@ -92,7 +94,7 @@ impl PictureBounds {
         square.has_terrain().then(|| [square.range[0], square.range[1].max(self.top)])
     }
 
-    /// The tiles along an axis in which a part lies nearest to the eye, and whether there are further ones.
+    /// Returns the copies along axis `k` in which a tile is nearest to the eye, and true if there are others.
     fn tiles_around(&self, k: usize, [low, high]: [f64; 2], eye: DVec3) -> (std::ops::RangeInclusive<u32>, bool) {
         let Some(period) = self.drape.period[k] else { return (0..=0, false) };
         let tiles = (self.last[k] + 1) / period;
@@ -102,7 +104,7 @@ impl PictureBounds {
         (first..=last, last - first + 1 < tiles)
     }
 
-    /// The box around a part in a tile; `None` beyond the field.
+    /// Returns the box of a tile in one copy of the image; `None` beyond the field.
     fn placed(&self, samples: [[f64; 2]; 2], [low, high]: [f32; 2], tile: [u32; 2]) -> Option<Aabb> {
         let along = |k: usize| {
             let shift = f64::from(tile[k]) * f64::from(self.drape.period[k].unwrap_or(0));
@@ -154,13 +156,13 @@ mod tests {
         assert!(bounds.range(bounds.samples(0, [15, 0]).unwrap()).is_some());
     }
 
-    /// A picture of more than the field: what lies beyond is never needed.
+    /// An image larger than the field: tiles beyond the field are never needed.
     #[test]
-    fn what_lies_beyond_the_field_is_not_needed() {
+    fn tiles_beyond_the_field_have_no_bounds() {
         let field = field(Holes::none(256 * 192));
         let drape = Drape { first: [-100.0, 50.0], length: [200.0, 400.0], period: [None; 2], ends: true };
         let bounds = bounds(&field, drape);
-        // Sixteen columns of pages of 12.5 samples, twelve rows of 33.3.
+        // Pages of 12.5 × 33.3 samples, sixteen columns and twelve rows.
         assert!(bounds.samples(0, [7, 0]).is_none() && bounds.samples(0, [0, 0]).is_none());
         let [[west, east], [north, south]] = bounds.samples(0, [9, 0]).unwrap();
         assert_eq!(([west, east], north, south.round()), ([12.5, 25.0], 50.0, 83.0));
@@ -169,9 +171,9 @@ mod tests {
         assert!(bounds.samples(0, [9, 11]).is_none(), "south of the field");
     }
 
-    /// The part of the tile at the eye counts, not that of the first one.
+    /// On a tiled field the copy around the eye counts, not the first one.
     #[test]
-    fn the_nearest_tile_counts() {
+    fn the_copy_nearest_to_the_eye_counts() {
         let tiled = field(Holes::none(256 * 192)).tiled([500, 400]);
         let bounds = bounds(&tiled, Drape::over(&tiled));
         let frustum = |view: &View| view.frustum();
@@ -180,7 +182,7 @@ mod tests {
         let down = view(DVec3::new(x, 40.0, z), -89.0);
         let below = bounds.pixel_m(0, [1, 1], &down, &frustum(&down)).unwrap() * down.focal_px();
         assert!((30.0..=40.0).contains(&below), "{below} m to the ground");
-        // A page off the picture's middle is not in sight near by, and counts as far as a tile is long.
+        // Another page is outside the frustum nearby, and counts as one period away.
         let aside = bounds.pixel_m(0, [8, 6], &down, &frustum(&down)).unwrap() * down.focal_px();
         assert!((aside - 192.0).abs() < 1e-9, "{aside} m");
     }

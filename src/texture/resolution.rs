@@ -1,32 +1,32 @@
-//! How fine a texture a triangle needs: by the logarithm of its area on the screen, or by the exponent of the float
-//! that holds it.
+//! Computes the texture level a triangle needs, from the logarithm of its screen area or from the exponent of the
+//! float that holds it.
 //!
 //! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §3 and §4. A square texture of level n has 4^n
-//! texels. A triangle of level l of a binary triangle tree covers 2^−(l+1) of its root square, so that with an area of
-//! a texels on the screen (quality² × pixels) a texture of the whole square needs a·2^(l+1) of them: level
-//! α = ⌈½ log2(a·2^(l+1))⌉. A texture q levels down its quadtree needs α − q.
+//! texels. A triangle of level l of a binary triangle tree covers 2^−(l+1) of its root square. If its screen area is
+//! a texels (quality² × pixels), a texture of the root square needs a·2^(l+1) texels: level α = ⌈½ log2(a·2^(l+1))⌉.
+//! A tile q levels down the quadtree needs level α − q.
 
-/// Texels of a square texture of a level: 4^level.
+/// Returns the texels of a square texture of a level: 4^level.
 pub fn texture_area(level: i32) -> f64 {
     2f64.powi(2 * level)
 }
 
-/// The level that a texture of the root square needs for a triangle of level `triangle_level` with an area of `texels`
-/// on the screen: ⌈½ log2(texels·2^(l+1))⌉ (§4.3, before its last step).
+/// Returns the level α of the root square's texture for a triangle of level `triangle_level` with a screen area of
+/// `texels`: ⌈½ log2(texels·2^(l+1))⌉ (§4.3, before its last step).
 pub fn level_by_logarithm(texels: f32, triangle_level: u32) -> i32 {
     (0.5 * (f64::from(texels).log2() + f64::from(triangle_level + 1))).ceil() as i32
 }
 
-/// The same without a logarithm: (l + x + 3) >> 1 with texels = m·2^x, 1 ≤ m < 2 (§4.3). Where m = 1 and l + x + 1 is
-/// even it says one more: the area counts as a little larger than it is.
+/// Returns the same level without a logarithm: (l + x + 3) >> 1 with texels = m·2^x, 1 ≤ m < 2 (§4.3). For m = 1 and
+/// even l + x + 1 the result is one level finer.
 ///
-/// `texels` must be positive and finite; subnormal ones have an exponent too.
+/// `texels` must be positive and finite; subnormal values are allowed.
 #[inline]
 pub fn level_by_exponent(texels: f32, triangle_level: u32) -> i32 {
     (triangle_level as i32 + exponent(texels) + 3) >> 1
 }
 
-/// ⌊log2⌋ of a positive finite float.
+/// Returns ⌊log2⌋ of a positive finite float.
 #[inline]
 pub fn exponent(value: f32) -> i32 {
     let bits = value.to_bits();
@@ -39,16 +39,16 @@ mod tests {
 
     use super::*;
 
-    /// The positive finite floats' bit patterns.
+    /// Bit patterns of all positive finite floats.
     const PATTERNS: std::ops::Range<u32> = 1..0x7f80_0000;
 
-    /// 2^n, exactly.
+    /// Returns 2^n, exactly.
     fn power_of_two(n: i32) -> f64 {
         f64::from_bits(((1023 + n) as u64) << 52)
     }
 
-    /// How many of a range of patterns at a level are not what ⌈½ log2⌉ is by its definition,
-    /// 4^(α−1) < a·2^(l+1) ≤ 4^α, and how many are the exception. All of it is exact in f64.
+    /// Counts the bit patterns of a range whose level violates the definition 4^(α−1) < a·2^(l+1) ≤ 4^α, and those
+    /// that are the documented exception (m = 1). All arithmetic is exact in f64.
     fn wrong(patterns: std::ops::Range<u32>, level: u32) -> [u64; 2] {
         let mut count = [0; 2];
         for bits in patterns {
@@ -75,19 +75,19 @@ mod tests {
     }
 
     #[test]
-    fn every_float_has_the_level_of_its_logarithm_at_an_even_and_an_odd_level() {
+    fn all_floats_match_the_definition_at_one_even_and_one_odd_level() {
         check(0);
         check(1);
     }
 
     #[test]
     #[ignore = "minutes: all 41 levels of 2^31 floats each"]
-    fn every_float_has_the_level_of_its_logarithm_at_every_level() {
+    fn all_floats_match_the_definition_at_every_level() {
         (0..=40).for_each(check);
     }
 
     #[test]
-    fn the_logarithm_agrees_where_it_is_not_within_its_rounding_of_an_integer() {
+    fn exponent_and_logarithm_agree_away_from_integers() {
         for level in 0..=40 {
             for bits in PATTERNS.step_by(99_991) {
                 let texels = f32::from_bits(bits);
@@ -99,9 +99,10 @@ mod tests {
         }
     }
 
-    /// A triangle of 515.42 texels that covers half of its texture needs 1030.84: level 6, 64 × 64.
+    /// A triangle of 515.42 texels that covers half of its texture needs 1030.84: level 5 is too small, level 6 (64 ×
+    /// 64) suffices.
     #[test]
-    fn the_worked_example() {
+    fn worked_example() {
         assert_eq!(level_by_logarithm(515.42, 0), 6);
         assert_eq!(level_by_exponent(515.42, 0), 6);
         assert!(texture_area(5) < 2.0 * 515.42 && 2.0 * 515.42 <= texture_area(6));

@@ -1,157 +1,161 @@
-//! A fixed number of textures of one size for the nodes of a working set: made on workers when they are first needed, and
-//! until then the nearest coarser node that is there serves.
+//! A fixed-size cache of virtual-texture tiles. Missing tiles are generated on worker threads; until then the nearest
+//! resident ancestor is drawn.
 //!
-//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §2.1 and §3.3: only nodes that are needed exist. The
-//! paper generates them in the frame that needs them; here no frame waits. A frame is a call of [`TileCache::begin`], one of
-//! [`TileCache::serve`] for each node needed, and one of [`TileCache::finish`]. A slot that served in the last frame is not
-//! given to another node: what the device still reads is not overwritten.
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §2.1 and §3.3: only tiles that are needed
+//! exist. Difference: the paper generates tiles in the frame that needs them; here no frame waits. A frame calls
+//! [`TileCache::begin`], then [`TileCache::resolve`] for each tile needed, then [`TileCache::finish`]. A slot used in
+//! the previous frame is not reassigned, so that texels still being read by the GPU are not overwritten.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use super::working_set::Node;
+use super::working_set::TileId;
 
-/// Red, green, blue and nothing.
+/// An RGBA texel; alpha is unused by ground tiles.
 pub type Texel = [u8; 4];
 
-/// Makes the texels of a node, row by row.
-pub type Make = dyn Fn(Node) -> Vec<Texel> + Send + Sync;
+/// Generates the texels of a tile, row by row. Called on worker threads.
+pub type GenerateTile = dyn Fn(TileId) -> Vec<Texel> + Send + Sync;
 
-/// The most nodes that workers are asked for at a time: a turn of the head makes others needed.
-const MAX_COMING: usize = 256;
+/// Upper limit of tiles in generation at a time. Fast camera turns make requested tiles obsolete.
+const MAX_REQUESTED: usize = 256;
 
-/// The root of the quadtree, which always has a slot.
-const ROOT: Node = Node { level: 0, at: [0, 0] };
+/// The root tile, always resident.
+const ROOT: TileId = TileId { level: 0, at: [0, 0] };
 
-/// What a slot is to be filled with before it serves.
+/// Texels to upload into a slot before the frame is drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fill {
-    /// Which slot.
+pub struct TileUpload {
+    /// Slot index.
     pub slot: u32,
-    /// Its texels, row by row.
+    /// Texels, row by row.
     pub texels: Vec<Texel>,
 }
 
-/// What serves a node: itself, or one around it.
+/// The resident tile to draw for a requested one: itself or an ancestor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResolvedTile {
-    /// Whose texels they are.
-    pub node: Node,
-    /// Where they are.
+    /// The resident tile.
+    pub tile: TileId,
+    /// Its slot index.
     pub slot: u32,
 }
 
+/// A tile in a slot.
 struct CachedTile {
     slot: u32,
-    /// The last frame in which it served.
+    /// Last frame in which the tile was drawn.
     frame: u64,
 }
 
-/// The slots.
+/// A cache of equally sized tiles with least-recently-used replacement.
 pub struct TileCache {
-    held: HashMap<Node, CachedTile>,
+    resident: HashMap<TileId, CachedTile>,
     free: Vec<u32>,
-    coming: HashSet<Node>,
-    missing: HashSet<Node>,
-    make: Arc<Make>,
-    made: Receiver<(Node, Vec<Texel>)>,
-    makes: Sender<(Node, Vec<Texel>)>,
-    /// Taken from the workers, not in a slot yet.
-    arrived: Vec<(Node, Vec<Texel>)>,
+    requested: HashSet<TileId>,
+    missing: HashSet<TileId>,
+    generate: Arc<GenerateTile>,
+    receiver: Receiver<(TileId, Vec<Texel>)>,
+    sender: Sender<(TileId, Vec<Texel>)>,
+    /// Generated tiles that have no slot yet.
+    arrived: Vec<(TileId, Vec<Texel>)>,
     frame: u64,
-    fills: Vec<Fill>,
+    uploads: Vec<TileUpload>,
 }
 
 impl TileCache {
-    /// So many slots, at least 1; the root's texels are made at once.
-    pub fn new(count: u32, make: Arc<Make>) -> Self {
-        let (makes, made) = channel();
-        let fills = vec![Fill { slot: 0, texels: make(ROOT) }];
-        let held = HashMap::from([(ROOT, CachedTile { slot: 0, frame: 0 })]);
+    /// Creates a cache of `count` slots, at least 1. The root tile is generated at once.
+    pub fn new(count: u32, generate: Arc<GenerateTile>) -> Self {
+        let (sender, receiver) = channel();
+        let uploads = vec![TileUpload { slot: 0, texels: generate(ROOT) }];
+        let resident = HashMap::from([(ROOT, CachedTile { slot: 0, frame: 0 })]);
         let free = (1..count.max(1)).rev().collect();
         Self {
-            held,
+            resident,
             free,
-            coming: HashSet::new(),
+            requested: HashSet::new(),
             missing: HashSet::new(),
-            make,
-            made,
-            makes,
+            generate,
+            receiver,
+            sender,
             arrived: Vec::new(),
             frame: 0,
-            fills,
+            uploads,
         }
     }
 
-    /// Begins a frame: gives slots to what was made meanwhile, to `max` nodes at the most, large ones first. Nodes for which
-    /// there is none are forgotten, and asked for again if they are still needed.
-    pub fn begin(&mut self, max: usize) -> Vec<Fill> {
-        let mut made = std::mem::take(&mut self.arrived);
-        made.extend(self.made.try_iter());
-        made.sort_unstable_by_key(|(node, _)| *node);
-        self.arrived = made.split_off(max.min(made.len()));
-        let mut oldest = self.unused(made.len());
-        for (node, texels) in made {
-            self.coming.remove(&node);
-            let Some(slot) = self.free.pop().or_else(|| self.held.remove(&oldest.pop()?).map(|held| held.slot)) else {
+    /// Begins a frame: assigns slots to at most `max` generated tiles, coarse ones first, and returns their uploads.
+    /// Tiles that get no slot are dropped; they are requested again if still needed.
+    pub fn begin(&mut self, max: usize) -> Vec<TileUpload> {
+        let mut generated = std::mem::take(&mut self.arrived);
+        generated.extend(self.receiver.try_iter());
+        generated.sort_unstable_by_key(|(tile, _)| *tile);
+        self.arrived = generated.split_off(max.min(generated.len()));
+        let mut oldest = self.least_recent(generated.len());
+        for (tile, texels) in generated {
+            self.requested.remove(&tile);
+            let Some(slot) =
+                self.free.pop().or_else(|| self.resident.remove(&oldest.pop()?).map(|resident| resident.slot))
+            else {
                 continue;
             };
-            self.held.insert(node, CachedTile { slot, frame: self.frame });
-            self.fills.push(Fill { slot, texels });
+            self.resident.insert(tile, CachedTile { slot, frame: self.frame });
+            self.uploads.push(TileUpload { slot, texels });
         }
         self.frame += 1;
         self.missing.clear();
-        std::mem::take(&mut self.fills)
+        std::mem::take(&mut self.uploads)
     }
 
-    /// Up to so many nodes that did not serve in the last frame, the longest unused last.
-    fn unused(&self, count: usize) -> Vec<Node> {
-        let unused = self.held.iter().filter(|(node, held)| **node != ROOT && held.frame < self.frame);
-        let mut nodes: Vec<_> = unused.map(|(node, held)| (held.frame, *node)).collect();
-        nodes.sort_unstable();
-        nodes.into_iter().take(count).rev().map(|(_, node)| node).collect()
+    /// Returns up to `count` tiles that were not drawn in the previous frame, the least recently used last.
+    fn least_recent(&self, count: usize) -> Vec<TileId> {
+        let least_recent =
+            self.resident.iter().filter(|(tile, resident)| **tile != ROOT && resident.frame < self.frame);
+        let mut tiles: Vec<_> = least_recent.map(|(tile, resident)| (resident.frame, *tile)).collect();
+        tiles.sort_unstable();
+        tiles.into_iter().take(count).rev().map(|(_, tile)| tile).collect()
     }
 
-    /// What serves a node in this frame: the finest that is there.
-    pub fn resolve(&mut self, node: Node) -> ResolvedTile {
-        let around = (0..=node.level).map(|up| node.above(up));
-        let found = around.into_iter().find(|node| self.held.contains_key(node)).unwrap_or(ROOT);
-        if found != node {
-            self.missing.insert(node);
+    /// Returns the finest resident tile around a tile, and marks it as used in this frame.
+    pub fn resolve(&mut self, tile: TileId) -> ResolvedTile {
+        let ancestors = (0..=tile.level).map(|up| tile.ancestor(up));
+        let nearest = ancestors.into_iter().find(|tile| self.resident.contains_key(tile)).unwrap_or(ROOT);
+        if nearest != tile {
+            self.missing.insert(tile);
         }
-        let held = self.held.get_mut(&found).expect("the root is always there");
-        held.frame = self.frame;
-        ResolvedTile { node: found, slot: held.slot }
+        let resident = self.resident.get_mut(&nearest).expect("the root tile is always resident");
+        resident.frame = self.frame;
+        ResolvedTile { tile: nearest, slot: resident.slot }
     }
 
-    /// Ends a frame: asks workers for what was missing, large nodes first.
+    /// Ends a frame: requests missing tiles from the workers, coarse ones first.
     pub fn finish(&mut self) {
-        let mut missing: Vec<_> = self.missing.iter().filter(|node| !self.coming.contains(node)).copied().collect();
+        let mut missing: Vec<_> = self.missing.iter().filter(|tile| !self.requested.contains(tile)).copied().collect();
         missing.sort_unstable();
-        for node in missing.into_iter().take(MAX_COMING.saturating_sub(self.coming.len())) {
-            self.coming.insert(node);
-            let (make, makes) = (Arc::clone(&self.make), self.makes.clone());
-            // Who no longer listens has gone.
-            rayon::spawn(move || drop(makes.send((node, make(node)))));
+        for tile in missing.into_iter().take(MAX_REQUESTED.saturating_sub(self.requested.len())) {
+            self.requested.insert(tile);
+            let (generate, sender) = (Arc::clone(&self.generate), self.sender.clone());
+            // Sending fails if the cache was dropped meanwhile.
+            rayon::spawn(move || drop(sender.send((tile, generate(tile)))));
         }
     }
 
-    /// Waits until all that was asked for is made.
+    /// Blocks until all requested tiles are generated.
     pub fn wait(&mut self) {
-        while self.arrived.len() < self.coming.len() {
-            self.arrived.extend(self.made.recv());
+        while self.arrived.len() < self.requested.len() {
+            self.arrived.extend(self.receiver.recv());
         }
     }
 
-    /// Nodes of this frame that a coarser one served.
+    /// Returns the number of tiles of this frame that an ancestor stands in for.
     pub fn pending(&self) -> usize {
         self.missing.len()
     }
 
-    /// Nodes that have a slot.
-    pub fn held(&self) -> usize {
-        self.held.len()
+    /// Returns the number of resident tiles.
+    pub fn resident(&self) -> usize {
+        self.resident.len()
     }
 }
 
@@ -159,71 +163,72 @@ impl TileCache {
 mod tests {
     use super::*;
 
-    /// Texels that tell whose they are.
-    fn label(node: Node) -> Vec<Texel> {
-        vec![[node.level as u8, node.at[0] as u8, node.at[1] as u8, 7]]
+    /// Texels that encode their tile.
+    fn label(tile: TileId) -> Vec<Texel> {
+        vec![[tile.level as u8, tile.at[0] as u8, tile.at[1] as u8, 7]]
     }
 
-    /// Frames of nodes about a place that wanders: what a device would find in each slot is what is said to be there.
+    /// Requests tiles around a moving point and checks the contents of every slot. Returns how many were exact and
+    /// how many were ancestors.
     fn wander(count: u32, frames: usize) -> (usize, usize) {
         let mut dice = fastrand::Rng::with_seed(2);
-        let mut slots = TileCache::new(count, Arc::new(label));
+        let mut cache = TileCache::new(count, Arc::new(label));
         let mut device = vec![Vec::new(); count as usize];
         let (mut place, mut exact, mut coarse) = ([128i32, 128], 0, 0);
         let mut last: HashSet<u32> = HashSet::new();
         for _ in 0..frames {
             place = place.map(|n| (n + dice.i32(-1..=1)).clamp(0, 240));
-            for Fill { slot, texels } in slots.begin(usize::MAX) {
-                assert!(!last.contains(&slot), "slot {slot} served in the last frame");
+            for TileUpload { slot, texels } in cache.begin(usize::MAX) {
+                assert!(!last.contains(&slot), "slot {slot} was used in the last frame");
                 device[slot as usize] = texels;
             }
             last.clear();
             for k in 0..40 {
                 let at = [place[0] + k % 8, place[1] + k / 8].map(|n| n as u32);
-                let needed = Node { level: 8, at };
-                let ResolvedTile { node, slot } = slots.resolve(needed);
-                assert_eq!(node, needed.above(8 - node.level), "not around it");
-                assert_eq!(device[slot as usize], label(node));
+                let needed = TileId { level: 8, at };
+                let ResolvedTile { tile, slot } = cache.resolve(needed);
+                assert_eq!(tile, needed.ancestor(8 - tile.level), "not an ancestor");
+                assert_eq!(device[slot as usize], label(tile));
                 last.insert(slot);
-                *(if node == needed { &mut exact } else { &mut coarse }) += 1;
+                *(if tile == needed { &mut exact } else { &mut coarse }) += 1;
             }
-            slots.finish();
-            assert!(slots.held() <= count as usize && slots.pending() <= 40);
-            slots.wait();
+            cache.finish();
+            assert!(cache.resident() <= count as usize && cache.pending() <= 40);
+            cache.wait();
         }
         (exact, coarse)
     }
 
     #[test]
-    fn nodes_are_served_by_themselves_or_by_one_around_them() {
+    fn a_tile_resolves_to_itself_or_an_ancestor() {
         let (exact, coarse) = wander(128, 300);
-        assert!(exact > 3 * coarse && coarse > 40, "{exact} served, {coarse} by coarser ones");
+        assert!(exact > 3 * coarse && coarse > 40, "{exact} exact, {coarse} ancestors");
     }
 
-    /// What was made is filled in over several frames, the large nodes first, and nothing is lost.
+    /// Generated tiles are uploaded over several frames, coarse ones first, and none is lost.
     #[test]
-    fn so_many_are_filled_in_a_frame() {
-        let mut slots = TileCache::new(64, Arc::new(label));
-        let nodes: Vec<_> = (1..4).flat_map(|level| (0..5).map(move |x| Node { level, at: [x, 0] })).collect();
-        let frame = |slots: &mut TileCache, max| {
-            let fills = slots.begin(max);
-            for node in &nodes {
-                slots.resolve(*node);
+    fn uploads_per_frame_are_limited() {
+        let mut cache = TileCache::new(64, Arc::new(label));
+        let tiles: Vec<_> = (1..4).flat_map(|level| (0..5).map(move |x| TileId { level, at: [x, 0] })).collect();
+        let frame = |cache: &mut TileCache, max| {
+            let uploads = cache.begin(max);
+            for tile in &tiles {
+                cache.resolve(*tile);
             }
-            slots.finish();
-            slots.wait();
-            fills
+            cache.finish();
+            cache.wait();
+            uploads
         };
-        assert_eq!(frame(&mut slots, 4).len(), 1, "the root");
-        let levels: Vec<u8> = (0..4).flat_map(|_| frame(&mut slots, 4)).map(|fill| fill.texels[0][0]).collect();
+        assert_eq!(frame(&mut cache, 4).len(), 1, "the root");
+        let levels: Vec<u8> = (0..4).flat_map(|_| frame(&mut cache, 4)).map(|fill| fill.texels[0][0]).collect();
         assert_eq!(levels, [1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3]);
-        assert_eq!(slots.pending(), 0);
-        assert!(frame(&mut slots, 4).is_empty());
+        assert_eq!(cache.pending(), 0);
+        assert!(frame(&mut cache, 4).is_empty());
     }
 
     #[test]
-    fn with_too_few_slots_coarser_ones_go_on_serving() {
+    fn ancestors_stand_in_when_slots_are_few() {
         let (exact, coarse) = wander(20, 100);
-        assert!(exact > 0 && coarse > exact / 4, "{exact} served, {coarse} by coarser ones");
+        assert!(exact > 0 && coarse > exact / 4, "{exact} exact, {coarse} ancestors");
     }
 }

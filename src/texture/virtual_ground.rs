@@ -1,51 +1,54 @@
-//! The working set of a ground's texels on the device: which nodes of its map a frame's wedges need, which of them are there,
-//! and the table in which a fragment finds its own.
+//! A virtual texture of generated ground texels: finds the tiles a frame needs, keeps them in a cache and builds the
+//! page table.
 //!
-//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part I. The wedges of the list say what is needed
-//! ([`wedges`]), each node's texture has the same size and lies in a slot, and texels are made on workers
-//! while the nearest coarser node that is there serves ([`TileCache`]). The paper tells each triangle its texture; here a
-//! fragment goes down a table of the nodes that serve ([`PageTable`]), so that any technique's triangles will do, and a
-//! fragment may find a finer node than its wedge asked for.
+//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part I. The wedges of a draw list determine
+//! the tiles needed ([`wedges`]). All tiles have the same size; they are generated on workers while the nearest
+//! resident ancestor stands in ([`TileCache`]).
+//!
+//! Difference: the paper assigns each triangle its texture. Here a fragment looks its tile up in a page table
+//! ([`PageTable`]), so that triangles of any technique work. A fragment may find a finer tile than its wedge
+//! requested.
 
 use std::sync::Arc;
 
 use super::ground::Ground;
 use super::page_table::PageTable;
-use super::pieces::Cutter;
-use super::tile_cache::{Fill, TileCache};
+use super::pieces::Clipper;
+use super::tile_cache::{TileCache, TileUpload};
 use super::virtual_overlay::VirtualTextureStats;
-use super::wedges::{self, Wedge, root_side};
-use super::working_set::{Node, Stop, WorkingSet};
+use super::wedges::{self, WedgeTriangle, root_side};
+use super::working_set::{Stop, TileId, WorkingSet};
 use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
 use crate::view::View;
 
-/// Level of a node's texture, and cells along its side.
-pub const SLOT_LEVEL: i32 = 6;
-const CELLS: u32 = 1 << SLOT_LEVEL;
-/// Level of the whole map: 2^36 texels.
-const MAP_LEVEL: i32 = 18;
-/// The least slots kept.
+/// Texture level of a tile, and cells along its side: 64 × 64 cells.
+pub const TILE_LEVEL: i32 = 6;
+const CELLS: u32 = 1 << TILE_LEVEL;
+/// Level of the whole virtual texture: 2^36 texels.
+const TEXTURE_LEVEL: i32 = 18;
+/// Minimum number of cache slots.
 const MIN_SLOTS: u64 = 64;
-/// The most: no screen needs more.
+/// Maximum number of cache slots; no screen needs more.
 pub const MAX_SLOTS: u64 = 4096;
-/// Slots that serve for nodes that are to come: the root, and some coarser ones.
+/// Slots reserved for stand-ins of pending tiles: the root and other coarse tiles.
 const SPARE: u32 = 16;
 
-/// How a ground's map is kept.
+/// Size of the virtual ground texture and of its tile cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VirtualGroundLayout {
-    /// Samples along a side of the root square, as a power of two, 1 to 31.
+    /// log2 of the root square's side in samples, 1 to 31.
     pub root_shift: u32,
-    /// Nodes kept.
+    /// Tiles in the cache.
     pub slots: u32,
 }
 
 impl VirtualGroundLayout {
-    /// For a field, a number of bytes, and at most `max_slots` nodes.
+    /// Returns the layout for a field, a memory budget in bytes and at most `max_slots` tiles (an image's layer
+    /// limit).
     ///
     /// # Errors
-    /// If the bytes do not hold the few nodes that there must be.
+    /// If the budget holds fewer than 64 tiles.
     pub fn new(field: &Field, budget_bytes: u64, max_slots: u32) -> Result<Self, String> {
         let tile = Self::tile_bytes();
         let slots = (budget_bytes / tile).min(u64::from(max_slots)).min(MAX_SLOTS);
@@ -56,128 +59,129 @@ impl VirtualGroundLayout {
         Ok(Self { root_shift: root_side(field).ilog2(), slots: slots as u32 })
     }
 
-    /// Texels along a side of a node's texture.
+    /// Returns the texels along a side of a tile.
     pub fn tile_side() -> u32 {
         CELLS + 1
     }
 
-    /// Bytes of a node's texture.
+    /// Returns the bytes of a tile.
     pub fn tile_bytes() -> u64 {
         4 * u64::from(CELLS + 1).pow(2)
     }
 
-    /// Bytes of all slots.
+    /// Returns the bytes of all cache slots.
     pub fn bytes(&self) -> u64 {
         u64::from(self.slots) * Self::tile_bytes()
     }
 
-    /// Level of the whole map: 18, or more where samples are closer than its texels.
-    pub fn map_level(&self) -> i32 {
-        MAP_LEVEL.max(self.root_shift as i32)
+    /// Returns the level of the whole virtual texture: 18, or more if samples are closer than its texels.
+    pub fn texture_level(&self) -> i32 {
+        TEXTURE_LEVEL.max(self.root_shift as i32)
     }
 
-    /// The most words of a frame's table.
+    /// Returns the maximum length of a page table, in words.
     pub fn table_words(&self) -> usize {
-        PageTable::max_words(self.slots as usize, (self.map_level() - SLOT_LEVEL) as u32)
+        PageTable::max_words(self.slots as usize, (self.texture_level() - TILE_LEVEL) as u32)
     }
 }
 
-/// The nodes that a frame's wedges need, as many as there are slots for.
+/// The tiles that the wedges of a frame need, limited to the cache size.
 pub struct GroundSet {
     layout: VirtualGroundLayout,
     set: WorkingSet,
-    /// Texels a pixel along an axis.
+    /// Texels per pixel along an axis.
     quality: f64,
 }
 
 impl GroundSet {
-    /// An empty set.
+    /// Creates an empty set.
     pub fn new(layout: VirtualGroundLayout) -> Self {
-        Self { layout, set: WorkingSet::new(layout.map_level(), Stop::Largest(SLOT_LEVEL)), quality: 1.0 }
+        Self { layout, set: WorkingSet::new(layout.texture_level(), Stop::Largest(TILE_LEVEL)), quality: 1.0 }
     }
 
-    /// Finds the nodes that wedges need: a texel a pixel, or fewer until they fit the slots. It ends: what covers less than
-    /// 2^-126 texels needs none.
-    pub fn show(&mut self, view: &View, wedges: &[Wedge]) {
+    /// Finds the tiles that wedges need at one texel per pixel, or at a lower density at which they fit the cache.
+    /// Terminates because areas below 2^-126 texels need no tile.
+    pub fn update(&mut self, view: &View, wedges: &[WedgeTriangle]) {
         self.quality = 1.0;
         loop {
-            let cutter = Cutter::new(view, self.quality, self.layout.map_level(), SLOT_LEVEL);
-            wedges::show(&mut self.set, view, cutter, wedges);
-            if self.set.nodes().count() <= (self.layout.slots - SPARE) as usize {
+            let clipper = Clipper::new(view, self.quality, self.layout.texture_level(), TILE_LEVEL);
+            wedges::update(&mut self.set, view, clipper, wedges);
+            if self.set.tiles().count() <= (self.layout.slots - SPARE) as usize {
                 return;
             }
             self.quality *= std::f64::consts::FRAC_1_SQRT_2;
         }
     }
 
-    /// The nodes with the levels of their textures.
+    /// Returns the tiles with the levels of their textures.
     pub fn set(&self) -> &WorkingSet {
         &self.set
     }
 
-    /// Length of a texel, pixels: 1, or longer where the slots do not hold that.
+    /// Returns the length of a texel, pixels: 1, or more if the cache is too small for that.
     pub fn texel_px(&self) -> f64 {
         1.0 / self.quality
     }
 }
 
-/// The working set on the device.
+/// The tile cache and page table of the ground of one field.
 pub struct VirtualGround {
     field: Arc<Field>,
     needed: GroundSet,
-    slots: TileCache,
+    cache: TileCache,
     table: PageTable,
 }
 
 impl VirtualGround {
-    /// For a field.
+    /// Creates the cache of a field's ground.
     pub fn new(field: &Arc<Field>, layout: VirtualGroundLayout) -> Self {
         let ground = Ground::new(field);
-        let slots = TileCache::new(layout.slots, Arc::new(move |node: Node| ground.tile(node, CELLS)));
-        Self { field: Arc::clone(field), needed: GroundSet::new(layout), slots, table: PageTable::new() }
+        let cache = TileCache::new(layout.slots, Arc::new(move |tile: TileId| ground.tile(tile, CELLS)));
+        Self { field: Arc::clone(field), needed: GroundSet::new(layout), cache, table: PageTable::new() }
     }
 
-    /// How it is kept.
+    /// Returns the layout.
     pub fn layout(&self) -> &VirtualGroundLayout {
         &self.needed.layout
     }
 
-    /// Finds the nodes that the wedges of a list need.
-    pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
-        self.needed.show(view, &wedges::of_list(&self.field, view, resident, list));
+    /// Determines the tiles that the wedges of a draw list need.
+    pub fn require(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
+        self.needed.update(view, &wedges::from_draw_list(&self.field, view, resident, list));
     }
 
-    /// Chooses what they are drawn with; what is to be filled in before, at most so many nodes.
-    pub fn look(&mut self, max_fills: usize) -> Vec<Fill> {
-        let fills = self.slots.begin(max_fills);
+    /// Rebuilds the page table with the tiles resident now and requests missing ones. Returns the texels to upload
+    /// before drawing, at most `max_uploads` tiles.
+    pub fn update(&mut self, max_uploads: usize) -> Vec<TileUpload> {
+        let uploads = self.cache.begin(max_uploads);
         self.table.clear();
-        for (node, _) in self.needed.set.nodes() {
-            self.table.enter(&self.slots.resolve(node));
+        for (tile, _) in self.needed.set.tiles() {
+            self.table.insert(&self.cache.resolve(tile));
         }
-        self.slots.finish();
-        fills
+        self.cache.finish();
+        uploads
     }
 
-    /// The nodes that serve since the last look.
+    /// Returns the page table of the last [`update`](Self::update).
     pub fn table(&self) -> &PageTable {
         &self.table
     }
 
-    /// Texels that the wedges seen last need.
+    /// Returns the texels that the wedges of the last [`require`](Self::require) need.
     pub fn texels(&self) -> f64 {
         self.needed.set.texels()
     }
 
-    /// Waits until all that was asked for is made.
+    /// Blocks until all requested tiles are generated.
     pub fn wait(&mut self) {
-        self.slots.wait();
+        self.cache.wait();
     }
 
-    /// What it holds since the last look.
+    /// Returns the cache statistics of the last [`update`](Self::update).
     pub fn stats(&self) -> VirtualTextureStats {
-        let held = self.slots.held();
+        let held = self.cache.resident();
         let bytes = held as u64 * VirtualGroundLayout::tile_bytes();
-        let (slots, pending) = (self.needed.layout.slots as usize, self.slots.pending());
+        let (slots, pending) = (self.needed.layout.slots as usize, self.cache.pending());
         VirtualTextureStats { slots, held, bytes, pending, texel_px: self.needed.texel_px() }
     }
 }

@@ -1,55 +1,57 @@
-//! A picture laid over a field that is larger than the memory for it: which of its maps a view needs, which of them are
-//! there, and which one each page is drawn with.
+//! A virtual texture for an overlay image that is larger than its memory budget.
 //!
-//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8: each page takes the coarsest map whose
-//! texels are at most a pixel where the page is nearest; what is there is drawn at once, and finer maps are made on workers
-//! meanwhile ([`TileCache`]). Where the paper has maps of many sizes, a coarser map here is a tile of the same size over twice
-//! as many pages along each axis: the same texels, and any slot takes any tile. A page's table entry says which slot, and
-//! how many pages the tile in it is long.
+//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998), §4.8: each page uses the coarsest mip level
+//! whose texels are at most one pixel at the page's nearest point. Resident tiles are drawn at once; finer ones are
+//! made on workers meanwhile ([`TileCache`]).
 //!
-//! Pages are squares of the picture's texels, wherever the picture lies over the field ([`Drape`]).
+//! Difference: the paper has textures of several sizes. Here a coarser mip level is a tile of the same size over
+//! twice as many pages along each axis. The texels are equal, and any slot takes any tile. A page table entry holds
+//! the slot and the length of its tile in pages.
+//!
+//! Pages are squares of image texels, independently of the image's placement over the field ([`Drape`]).
 
 use std::fmt;
 use std::sync::Arc;
 
 use super::drape::Drape;
-use super::overlay_pyramid::{Layout, OverlayPyramid, Picture};
+use super::overlay_pyramid::{OverlayPyramid, Picture, PyramidLayout};
 use super::picture_bounds::PictureBounds;
-use super::tile_cache::{Fill, TileCache};
-use super::working_set::Node;
+use super::tile_cache::{TileCache, TileUpload};
+use super::working_set::TileId;
 use crate::height::Field;
 use crate::view::{Frustum, View};
 
-/// How a picture is cut, and how much of it is kept.
+/// The grid of pages over an image, and the size of the tile cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VirtualTextureLayout {
     /// Pages along (x, z).
     pub pages: [u32; 2],
-    /// Length of the picture's sides in pages: less than `pages` where the last ones stick out.
+    /// Length of the image's sides in pages. Less than `pages` where the last page extends beyond the image.
     pub extent: [f64; 2],
-    /// Cells between the texels along a side of a tile: a power of two.
+    /// Texels along a side of a tile, less one: a power of two.
     pub cells: u32,
-    /// A tile of the root is 2^depth pages long.
+    /// Level of single pages in the tile quadtree: the root tile is 2^depth pages long.
     pub depth: u32,
-    /// Tiles kept.
+    /// Tiles in the cache.
     pub slots: u32,
 }
 
-/// The least cells along a side of a tile.
+/// Minimum cells along a side of a tile.
 const MIN_CELLS: u32 = 128;
-/// The most: those of [`OverlayPyramid`].
+/// Maximum cells along a side of a tile, as in [`OverlayPyramid`].
 const MAX_CELLS: u32 = 4096;
-/// Tiles that serve for others of a frame: the root, and one that gives way to what it stands in for.
+/// Slots reserved for stand-ins: the root, and a tile that is replaced by the one it stands in for.
 const SPARE: u32 = 2;
-/// The least tiles kept: a root with all four in it.
+/// Minimum number of cache slots: the root, its four children and the reserve.
 const MIN_SLOTS: u64 = 5 + SPARE as u64;
 
 impl VirtualTextureLayout {
-    /// Cuts a picture of `picture` texels for a number of bytes and at most `max_slots` tiles. `repeats`: along this axis
-    /// it goes on from its start where it ends, and so has whole pages.
+    /// Returns the layout for an image of `picture` texels along (x, z), a memory budget in bytes and at most
+    /// `max_slots` tiles (an image's layer limit). `repeats`: true, per axis, if the image wraps around; it then has
+    /// a whole number of pages.
     ///
     /// # Errors
-    /// If the bytes do not hold the smallest number of tiles.
+    /// If the image is too large for tiles of 4096 cells, or if the budget holds fewer than 7 tiles.
     pub fn new(picture: [u32; 2], repeats: [bool; 2], budget_bytes: u64, max_slots: u32) -> Result<Self, String> {
         let layout = |cells: u32| {
             let pages = picture.map(|n| n.div_ceil(cells));
@@ -71,151 +73,156 @@ impl VirtualTextureLayout {
         Ok(Self { slots: slots as u32, ..whole })
     }
 
-    /// Bytes of a tile.
+    /// Returns the bytes of a tile.
     pub fn tile_bytes(&self) -> u64 {
         4 * u64::from(self.cells + 1).pow(2)
     }
 
-    /// Bytes of all tiles kept.
+    /// Returns the bytes of all cache slots.
     pub fn bytes(&self) -> u64 {
         u64::from(self.slots) * self.tile_bytes()
     }
 }
 
-/// What a working set holds.
+/// Statistics of a tile cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct VirtualTextureStats {
-    /// Tiles there are slots for.
+    /// Cache slots.
     pub slots: usize,
-    /// Tiles that are there.
+    /// Resident tiles.
     pub held: usize,
-    /// Bytes of these.
+    /// Bytes of the resident tiles.
     pub bytes: u64,
-    /// Tiles of this frame that are not there yet.
+    /// Tiles that this frame needs and that are not resident yet.
     pub pending: usize,
-    /// Pixels that a texel may be long, along an axis: 1, or more where the memory does not hold a finer picture.
+    /// Length that a texel may have, pixels: 1, or more if the budget is too small for that.
     pub texel_px: f64,
 }
 
 impl fmt::Display for VirtualTextureStats {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { slots, held, bytes, pending, texel_px } = self;
-        write!(f, "{held} of {slots}, {:.1} MB, {pending} to come, {texel_px:.1} px", *bytes as f64 / 1e6)
+        write!(f, "{held} of {slots}, {:.1} MB, {pending} pending, texels of {texel_px:.1} px", *bytes as f64 / 1e6)
     }
 }
 
-/// The maps of a picture.
+/// The tile cache and page table of an overlay image.
 pub struct VirtualOverlay {
     layout: VirtualTextureLayout,
-    slots: TileCache,
+    cache: TileCache,
     bounds: PictureBounds,
     table: Vec<u32>,
     texel_px: f64,
 }
 
 impl VirtualOverlay {
-    /// Filters a picture of RGBA texels, row by row, that lies over a field with samples.
+    /// Filters an RGBA image placed over a field. The field must have samples.
     pub fn new(field: &Field, layout: VirtualTextureLayout, drape: Drape, picture: Picture) -> Self {
         let VirtualTextureLayout { pages, extent, depth, .. } = layout;
-        let maps = OverlayPyramid::new(picture, Layout { pages, extent, repeats: drape.repeats() });
-        debug_assert_eq!(maps.side(0), layout.cells + 1);
-        let slots = TileCache::new(layout.slots, Arc::new(move |node: Node| maps.tile(depth - node.level, node.at)));
+        let pyramid = OverlayPyramid::new(picture, PyramidLayout { pages, extent, repeats: drape.repeats() });
+        debug_assert_eq!(pyramid.side(0), layout.cells + 1);
+        let cache =
+            TileCache::new(layout.slots, Arc::new(move |tile: TileId| pyramid.tile(depth - tile.level, tile.at)));
         let table = vec![entry(0, depth); pages[0] as usize * pages[1] as usize];
-        Self { layout, slots, bounds: PictureBounds::new(field, &layout, drape), table, texel_px: 1.0 }
+        Self { layout, cache, bounds: PictureBounds::new(field, &layout, drape), table, texel_px: 1.0 }
     }
 
-    /// How it is cut.
+    /// Returns the layout.
     pub fn layout(&self) -> &VirtualTextureLayout {
         &self.layout
     }
 
-    /// Chooses what the pages in sight are drawn with; what is to be filled in before, at most so many tiles.
-    pub fn look(&mut self, view: &View, max_fills: usize) -> Vec<Fill> {
-        let fills = self.slots.begin(max_fills);
+    /// Rebuilds the page table for a view with the tiles resident now and requests missing ones. Returns the texels
+    /// to upload before drawing, at most `max_uploads` tiles.
+    pub fn update(&mut self, view: &View, max_uploads: usize) -> Vec<TileUpload> {
+        let uploads = self.cache.begin(max_uploads);
         let (needed, texel_px) = self.needed(view);
         self.texel_px = texel_px;
-        // What is not in sight is never seen, but always there.
+        // Pages outside the frustum get the root tile.
         self.table.fill(entry(0, self.layout.depth));
-        for node in needed {
-            let resolved = self.slots.resolve(node);
-            self.enter(node, entry(resolved.slot, self.layout.depth - resolved.node.level));
+        for tile in needed {
+            let resolved = self.cache.resolve(tile);
+            self.fill_pages(tile, entry(resolved.slot, self.layout.depth - resolved.tile.level));
         }
-        self.slots.finish();
-        fills
+        self.cache.finish();
+        uploads
     }
 
-    /// What each page is drawn with since the last look, row by row: the slot times 16, and the number of times that the tile
-    /// in it is twice as long as a page.
+    /// Returns the page table of the last [`update`](Self::update), row by row. An entry is slot · 16 + log2 of the
+    /// length of its tile in pages.
     pub fn table(&self) -> &[u32] {
         &self.table
     }
 
-    /// Waits until all that was asked for is made.
+    /// Blocks until all requested tiles are generated.
     pub fn wait(&mut self) {
-        self.slots.wait();
+        self.cache.wait();
     }
 
-    /// What it holds since the last look.
+    /// Returns the cache statistics of the last [`update`](Self::update).
     pub fn stats(&self) -> VirtualTextureStats {
-        let held = self.slots.held();
+        let held = self.cache.resident();
         let bytes = held as u64 * self.layout.tile_bytes();
         VirtualTextureStats {
             slots: self.layout.slots as usize,
             held,
             bytes,
-            pending: self.slots.pending(),
+            pending: self.cache.pending(),
             texel_px: self.texel_px,
         }
     }
 
-    fn enter(&mut self, node: Node, entry: u32) {
-        let shift = self.layout.depth - node.level;
-        let along = |k: usize| (node.at[k] << shift)..((node.at[k] + 1) << shift).min(self.layout.pages[k]);
+    /// Writes an entry to all pages that a tile covers.
+    fn fill_pages(&mut self, tile: TileId, entry: u32) {
+        let shift = self.layout.depth - tile.level;
+        let along = |k: usize| (tile.at[k] << shift)..((tile.at[k] + 1) << shift).min(self.layout.pages[k]);
         for z in along(1) {
             let row = (z * self.layout.pages[0]) as usize;
             self.table[row + along(0).start as usize..row + along(0).end as usize].fill(entry);
         }
     }
 
-    /// The tiles in sight whose texels are at most a pixel, or as few pixels as there is room for; and how many.
-    fn needed(&self, view: &View) -> (Vec<Node>, f64) {
+    /// Returns the tiles in view whose texels are at most `texel_px` pixels long, and `texel_px`: 1, or the smallest
+    /// multiple by √2 at which the tiles fit the cache.
+    fn needed(&self, view: &View) -> (Vec<TileId>, f64) {
         let (max, frustum) = ((self.layout.slots - SPARE) as usize, view.frustum());
         let mut texel_px = 1.0;
         loop {
-            let mut nodes = Vec::new();
-            let root = Node { level: 0, at: [0, 0] };
-            if self.visit(root, view, &frustum, texel_px, &mut nodes, max).is_some() {
-                return (nodes, texel_px);
+            let mut tiles = Vec::new();
+            let root = TileId { level: 0, at: [0, 0] };
+            if self.visit(root, view, &frustum, texel_px, &mut tiles, max).is_some() {
+                return (tiles, texel_px);
             }
             texel_px *= std::f64::consts::SQRT_2;
         }
     }
 
-    /// Appends what is needed below a node; `None` if it were more than `max`.
+    /// Appends the tiles needed below a tile; `None` if they exceed `max`.
     fn visit(
         &self,
-        node: Node,
+        tile: TileId,
         view: &View,
         frustum: &Frustum,
         texel_px: f64,
-        found: &mut Vec<Node>,
+        found: &mut Vec<TileId>,
         max: usize,
     ) -> Option<()> {
-        let up = self.layout.depth - node.level;
-        let Some(pixel_m) = self.bounds.pixel_m(up, node.at, view, frustum) else { return Some(()) };
-        // Any texel is short enough at last: few slots may not hold the finest tiles around the eye.
+        let up = self.layout.depth - tile.level;
+        let Some(pixel_m) = self.bounds.pixel_m(up, tile.at, view, frustum) else { return Some(()) };
+        // At infinite `texel_px` any texel is short enough: a small cache may not hold the finest tiles around the eye.
         if up == 0 || texel_px == f64::INFINITY || self.bounds.texel_m(up) <= texel_px * pixel_m {
-            found.push(node);
+            found.push(tile);
             return (found.len() <= max).then_some(());
         }
-        let [x, z] = node.at.map(|n| 2 * n);
+        let [x, z] = tile.at.map(|n| 2 * n);
         let places = [[x, z], [x + 1, z], [x, z + 1], [x + 1, z + 1]];
         let is_there = |at: &[u32; 2]| (0..2).all(|k| at[k] << (up - 1) < self.layout.pages[k]);
-        let mut children = places.into_iter().filter(is_there).map(|at| Node { level: node.level + 1, at });
+        let mut children = places.into_iter().filter(is_there).map(|at| TileId { level: tile.level + 1, at });
         children.try_for_each(|child| self.visit(child, view, frustum, texel_px, found, max))
     }
 }
 
+/// Encodes a page table entry.
 fn entry(slot: u32, up: u32) -> u32 {
     slot << 4 | up
 }
@@ -228,20 +235,20 @@ mod tests {
     use crate::height::{Holes, Samples};
     use crate::view::{Lens, Metric, Tolerance};
 
-    /// Flat land of 257 × 200 samples a metre apart, its west half higher.
+    /// A plane of 257 × 200 samples, 1 m apart, whose west half is 40 m higher.
     fn field() -> Field {
         let heights = (0..257 * 200).map(|k| if k % 257 < 128 { 40.0 } else { 0.0 }).collect();
         Field::new(Samples::F32(heights), [257, 200], [1.0; 2], Holes::none(257 * 200))
     }
 
-    fn maps(budget_bytes: u64) -> VirtualOverlay {
+    fn overlay(budget_bytes: u64) -> VirtualOverlay {
         let size = [4096, 3184];
         let texels = (0..size[0] * size[1]).map(|k: u32| k.wrapping_mul(0x9e37_79b1).to_le_bytes()).collect::<Vec<_>>();
         let layout = VirtualTextureLayout::new(size, [false; 2], budget_bytes, 2048).unwrap();
         VirtualOverlay::new(&field(), layout, Drape::over(&field()), Picture { size, texels: &texels })
     }
 
-    /// From a place 1.7 m above the ground, or from above.
+    /// A view from `above_m` metres above the ground.
     fn view(x: f64, above_m: f64, pitch: f64) -> View {
         View {
             eye: DVec3::new(x, if x < 128.0 { 40.0 } else { 0.0 } + above_m, 60.0),
@@ -254,19 +261,19 @@ mod tests {
         }
     }
 
-    fn settled(maps: &mut VirtualOverlay, view: &View) -> VirtualTextureStats {
+    fn settled(overlay: &mut VirtualOverlay, view: &View) -> VirtualTextureStats {
         for _ in 0..1000 {
-            maps.look(view, 4);
-            maps.wait();
-            if maps.stats().pending == 0 {
-                return maps.stats();
+            overlay.update(view, 4);
+            overlay.wait();
+            if overlay.stats().pending == 0 {
+                return overlay.stats();
             }
         }
-        panic!("it does not come to rest");
+        panic!("tiles are still pending after 1000 frames");
     }
 
     #[test]
-    fn a_cut_is_as_fine_as_its_picture() {
+    fn pages_are_at_least_as_fine_as_the_image() {
         for (picture, repeats) in
             [([2048, 2048], true), ([16_384, 1000], false), ([20_000, 9], true), ([14_000, 14_000], false)]
         {
@@ -283,55 +290,56 @@ mod tests {
         assert!(refused.contains("expected at least 1 MB"), "{refused}");
     }
 
-    /// Every page in sight has texels of at most a pixel where it is nearest, and none finer than it need be.
+    /// Each page in view has the coarsest mip level whose texels are at most a pixel at its nearest point.
     #[test]
-    fn texels_are_at_most_a_pixel() {
-        let mut maps = maps(1 << 28);
+    fn texels_in_view_are_at_most_a_pixel() {
+        let mut overlay = overlay(1 << 28);
         for view in [view(200.0, 1.7, -5.0), view(60.0, 1.7, -5.0), view(128.0, 300.0, -89.0)] {
-            settled(&mut maps, &view);
-            let layout = *maps.layout();
+            settled(&mut overlay, &view);
+            let layout = *overlay.layout();
             let (mut fine, mut coarse) = (0, 0);
-            for (k, entry) in maps.table().iter().enumerate() {
+            for (k, entry) in overlay.table().iter().enumerate() {
                 let page = [k as u32 % layout.pages[0], k as u32 / layout.pages[0]];
                 let (level, frustum) = (entry & 15, view.frustum());
-                let Some(pixel_m) = maps.bounds.pixel_m(0, page, &view, &frustum) else { continue };
-                assert!(level == 0 || maps.bounds.texel_m(level) <= pixel_m, "page {page:?}: {level}");
+                let Some(pixel_m) = overlay.bounds.pixel_m(0, page, &view, &frustum) else { continue };
+                assert!(level == 0 || overlay.bounds.texel_m(level) <= pixel_m, "page {page:?}: {level}");
                 *(if level == 0 { &mut fine } else { &mut coarse }) += 1;
-                let around = maps.bounds.pixel_m(level + 1, page.map(|n| n >> (level + 1)), &view, &frustum);
-                let is_too_fine = around.is_some_and(|px| level < layout.depth && maps.bounds.texel_m(level + 1) <= px);
+                let around = overlay.bounds.pixel_m(level + 1, page.map(|n| n >> (level + 1)), &view, &frustum);
+                let is_too_fine =
+                    around.is_some_and(|px| level < layout.depth && overlay.bounds.texel_m(level + 1) <= px);
                 assert!(!is_too_fine, "page {page:?}: {level}");
             }
-            assert!(fine + coarse > 10, "{fine} pages with their own maps, {coarse} with coarser ones");
+            assert!(fine + coarse > 10, "{fine} pages at mip level 0, {coarse} at coarser levels");
         }
     }
 
-    /// The root serves at once, finer ones follow, and the end depends on the view alone.
+    /// The root is drawn at once, finer tiles follow, and the final table depends on the view alone.
     #[test]
-    fn coarse_at_once_and_finer_ones_follow() {
+    fn the_root_is_drawn_at_once_and_finer_tiles_follow() {
         let (there, here) = (view(60.0, 1.7, -5.0), view(200.0, 1.7, -5.0));
-        let mut maps = maps(1 << 28);
-        let fills = maps.look(&here, 4);
-        assert_eq!((fills.len(), maps.stats().held), (1, 1), "the root");
-        assert!(maps.table().iter().all(|&t| t == entry(0, maps.layout.depth)) && maps.stats().pending > 4);
-        let levels = |maps: &VirtualOverlay| maps.table().iter().map(|entry| entry & 15).collect::<Vec<_>>();
-        settled(&mut maps, &here);
-        let first = levels(&maps);
+        let mut overlay = overlay(1 << 28);
+        let uploads = overlay.update(&here, 4);
+        assert_eq!((uploads.len(), overlay.stats().held), (1, 1), "the root");
+        assert!(overlay.table().iter().all(|&t| t == entry(0, overlay.layout.depth)) && overlay.stats().pending > 4);
+        let levels = |overlay: &VirtualOverlay| overlay.table().iter().map(|entry| entry & 15).collect::<Vec<_>>();
+        settled(&mut overlay, &here);
+        let first = levels(&overlay);
         assert!(first.contains(&0), "{first:?}");
-        settled(&mut maps, &there);
-        assert_ne!(levels(&maps), first);
-        settled(&mut maps, &here);
-        assert_eq!(levels(&maps), first);
+        settled(&mut overlay, &there);
+        assert_ne!(levels(&overlay), first);
+        settled(&mut overlay, &here);
+        assert_eq!(levels(&overlay), first);
     }
 
-    /// With less memory texels are longer, no more tiles are held than there are slots, and every view comes to rest.
+    /// The cache never exceeds its slots, and every view settles.
     #[test]
-    fn memory_is_by_choice() {
+    fn a_smaller_budget_gives_longer_texels() {
         let mut before = f64::INFINITY;
         for budget in [500_000, 2_000_000, 8_000_000, 1 << 28] {
-            let mut maps = maps(budget);
+            let mut overlay = overlay(budget);
             let mut worst: f64 = 0.0;
             for x in [10.0, 60.0, 120.0, 140.0, 200.0, 250.0] {
-                let stats = settled(&mut maps, &view(x, 1.7, -5.0));
+                let stats = settled(&mut overlay, &view(x, 1.7, -5.0));
                 assert!(stats.bytes <= budget && stats.held <= stats.slots);
                 worst = worst.max(stats.texel_px);
             }
@@ -341,12 +349,12 @@ mod tests {
         assert_eq!(before, 1.0);
     }
 
-    /// The eye is in the boxes of a tile of every level, more than there are slots for.
+    /// The eye is inside the boxes of tiles of every level, which are more than the slots.
     #[test]
-    fn few_slots_come_to_rest_within_the_range_of_heights() {
-        let mut maps = maps(500_000);
-        let max = maps.layout.slots - SPARE;
-        assert!(3 * maps.layout.depth + 1 > max, "{max} slots, {} levels", maps.layout.depth);
-        settled(&mut maps, &view(128.0, 20.0, -5.0));
+    fn few_slots_settle_with_the_eye_among_the_heights() {
+        let mut overlay = overlay(500_000);
+        let max = overlay.layout.slots - SPARE;
+        assert!(3 * overlay.layout.depth + 1 > max, "{max} slots, {} levels", overlay.layout.depth);
+        settled(&mut overlay, &view(128.0, 20.0, -5.0));
     }
 }

@@ -1,4 +1,4 @@
-//! The window's events, and the loop that draws frames.
+//! The window's event handling and frame loop.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,19 +23,19 @@ use crate::gpu::{Instance, swapchain};
 use crate::lod::{Entry, Settings};
 use crate::view::{Lens, View};
 
-/// How long to sleep while there is nothing to draw to.
-const REST: Duration = Duration::from_millis(20);
+/// Sleep per loop iteration while the window is not visible.
+const IDLE_SLEEP: Duration = Duration::from_millis(20);
 
-/// Asks the loop to end.
+/// User event that ends the event loop.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop;
+pub struct QuitEvent;
 
-/// The program while its window is open.
+/// State of the program while its window is open.
 pub struct App<'a> {
     setup: &'a Setup,
     bindings: Vec<Binding>,
     session: Session,
-    open: Option<Open>,
+    open: Option<OpenWindow>,
     input: Input,
     times: Times,
     started: Instant,
@@ -45,15 +45,15 @@ pub struct App<'a> {
     failure: Option<anyhow::Error>,
 }
 
-/// The window and what draws in it. The stage goes first.
-struct Open {
+/// The window and its renderer. Fields drop in order: the renderer before the window.
+struct OpenWindow {
     renderer: WindowRenderer,
     context: egui::Context,
     window: Arc<Window>,
     is_occluded: bool,
 }
 
-/// What is held down, and what came in since the last frame.
+/// Keys held down, and mouse input since the last frame.
 #[derive(Default)]
 struct Input {
     held: Vec<Action>,
@@ -64,7 +64,7 @@ struct Input {
 }
 
 impl<'a> App<'a> {
-    /// Nothing is open yet.
+    /// Creates the state; the window opens when the event loop resumes.
     pub fn new(setup: &'a Setup) -> Self {
         Self {
             setup,
@@ -81,10 +81,10 @@ impl<'a> App<'a> {
         }
     }
 
-    /// How it went, once the loop has ended.
+    /// Returns the statistics of the session after the loop has ended, or its error.
     pub fn into_summary(mut self) -> Result<Summary> {
         let seconds = self.started.elapsed().as_secs_f64();
-        // Device and instance go before the messages are read: they may have a last word.
+        // Dropping device and instance may add validation messages.
         self.open = None;
         if let Some(failure) = self.failure {
             return Err(failure);
@@ -99,13 +99,13 @@ impl<'a> App<'a> {
         let attributes = Window::default_attributes()
             .with_title(self.session.title(self.setup))
             .with_inner_size(PhysicalSize::new(width, height));
-        let window = Arc::new(event_loop.create_window(attributes).context("no window")?);
+        let window = Arc::new(event_loop.create_window(attributes).context("no window could be created")?);
         let instance = Instance::new(&swapchain::extensions(event_loop)?, self.setup.validate)?;
         self.messages = Arc::clone(&instance.messages);
         let shared: Arc<dyn swapchain::Window> = Arc::clone(&window) as _;
         let renderer = WindowRenderer::new(self.setup, &instance, shared)?;
         self.device = renderer.device().to_string();
-        self.open = Some(Open { renderer, context: egui::Context::default(), window, is_occluded: false });
+        self.open = Some(OpenWindow { renderer, context: egui::Context::default(), window, is_occluded: false });
         self.started = Instant::now();
         Ok(())
     }
@@ -117,12 +117,12 @@ impl<'a> App<'a> {
         let fit = if open.is_occluded { None } else { open.renderer.fit([size.width, size.height])? };
         let Some(size) = fit else {
             self.last_frame = None;
-            std::thread::sleep(REST);
+            std::thread::sleep(IDLE_SLEEP);
             return Ok(());
         };
         let now = Instant::now();
         let dt = self.last_frame.replace(now).map(|last| (now - last).as_secs_f64());
-        let motion = self.input.motion(degrees_across(self.setup.view.lens) / f64::from(size[0]));
+        let motion = self.input.motion(degrees_per_width(self.setup.view.lens) / f64::from(size[0]));
         self.session.advance(&motion, &open.renderer.stats, dt.unwrap_or(0.0));
         let time_s = self.started.elapsed().as_secs_f64();
         let view = View { time_s, ..self.session.view(self.setup, size) };
@@ -131,8 +131,8 @@ impl<'a> App<'a> {
         let overlay = |stats: &FrameStats| {
             let content = Content {
                 rows: self.session.rows(stats),
-                help: self.session.helps.then_some(self.bindings.as_slice()),
-                // A screenshot does not tell of the one before.
+                help: self.session.shows_help.then_some(self.bindings.as_slice()),
+                // Screenshots do not show the note about the previous one.
                 note: self.session.note().filter(|_| !wants_copy),
             };
             hud::paint(&open.context, size, scale, &content)
@@ -143,23 +143,23 @@ impl<'a> App<'a> {
             if let Some(dt) = dt {
                 self.times.add(dt * 1e3);
             }
-            self.keep(shown);
+            self.save_screenshot(shown);
         }
         Ok(())
     }
 
-    /// Writes the copy of a frame, if one was wanted.
-    fn keep(&mut self, shown: Shown) {
+    /// Saves the copy of a frame if one was requested.
+    fn save_screenshot(&mut self, shown: Shown) {
         if !std::mem::take(&mut self.session.wants_copy) {
             return;
         }
         let path = free_path();
         let note = match shown.copy.map(|picture| (self.setup.save)(&path, &picture)) {
             Some(Ok(())) => format!("saved {}", path.display()),
-            Some(Err(error)) => format!("not saved: {error:#}"),
-            None => "this window's pictures cannot be copied".to_string(),
+            Some(Err(error)) => format!("screenshot not saved: {error:#}"),
+            None => "screenshots of this window are not supported".to_string(),
         };
-        self.session.tell(note);
+        self.session.show_note(note);
         self.last_frame = None;
     }
 
@@ -173,18 +173,18 @@ impl<'a> App<'a> {
             Request::Look => open.renderer.set_look(self.setup, &self.session.look)?,
             Request::Technique => self.prepare(before)?,
         }
-        // What took long was no frame.
+        // Preparation time is not frame time.
         self.last_frame = None;
         Ok(())
     }
 
-    /// Prepares the session's technique, or goes back to the one before if this device cannot hold it.
+    /// Prepares the session's technique. Restores the previous one if the device cannot hold it.
     fn prepare(&mut self, before: (&'static Entry, Settings)) -> Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let (entry, settings) = &self.session.technique;
         open.window.set_title(&format!("cuesta: preparing {}", entry.name));
         if let Err(error) = open.renderer.set_technique(self.setup, &self.session.look, entry, settings) {
-            self.session.tell(format!("{}: {error:#}", entry.name));
+            self.session.show_note(format!("{}: {error:#}", entry.name));
             open.renderer.set_technique(self.setup, &self.session.look, before.0, &before.1)?;
             self.session.technique = before;
         }
@@ -193,7 +193,7 @@ impl<'a> App<'a> {
     }
 
     fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent) -> Result<()> {
-        let Some(action) = bindings::of_key(&self.bindings, event) else { return Ok(()) };
+        let Some(action) = bindings::action_of_key(&self.bindings, event) else { return Ok(()) };
         self.input.held.retain(|held| *held != action);
         if event.state == ElementState::Released {
             return Ok(());
@@ -219,11 +219,11 @@ impl<'a> App<'a> {
                 }
             }
             WindowEvent::MouseInput { state, .. } => {
-                let looks = bindings::of(&self.bindings, Trigger::Drag) == Some(Action::Look);
+                let looks = bindings::action_of(&self.bindings, Trigger::Drag) == Some(Action::Turn);
                 self.input.is_dragging = looks && state == ElementState::Pressed;
             }
             WindowEvent::CursorMoved { position, .. } => self.input.point(DVec2::new(position.x, position.y)),
-            WindowEvent::MouseWheel { delta, .. } if bindings::of(&self.bindings, Trigger::Wheel).is_some() => {
+            WindowEvent::MouseWheel { delta, .. } if bindings::action_of(&self.bindings, Trigger::Wheel).is_some() => {
                 self.input.wheel += match delta {
                     MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
                     MouseScrollDelta::PixelDelta(pixels) => pixels.y / 40.0,
@@ -252,7 +252,7 @@ impl Input {
         }
     }
 
-    /// What is wanted in this frame; takes what has come in.
+    /// Returns the camera motion of this frame and resets accumulated mouse input.
     fn motion(&mut self, degrees_per_px: f64) -> Motion {
         let drive: DVec3 = self.held.iter().map(|a| if let Action::Move(axis) = a { *axis } else { DVec3::ZERO }).sum();
         Motion {
@@ -264,17 +264,17 @@ impl Input {
     }
 }
 
-/// The turn that carries the view across the window.
-fn degrees_across(lens: Lens) -> f64 {
+/// Returns the camera turn for a drag across the whole window, degrees.
+fn degrees_per_width(lens: Lens) -> f64 {
     match lens {
         Lens::Perspective { fov_x } => fov_x.to_degrees(),
         Lens::Orthographic { .. } => 90.0,
     }
 }
 
-impl ApplicationHandler<Stop> for App<'_> {
+impl ApplicationHandler<QuitEvent> for App<'_> {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        // Every frame asks for the next one, and the window system says when.
+        // Each frame requests a redraw; the window system schedules it.
         event_loop.set_control_flow(ControlFlow::Wait);
         if self.open.is_none() {
             let opened = self.open(event_loop);
@@ -287,7 +287,7 @@ impl ApplicationHandler<Stop> for App<'_> {
         self.check(event_loop, handled);
     }
 
-    fn user_event(&mut self, event_loop: &ActiveEventLoop, _: Stop) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, _: QuitEvent) {
         event_loop.exit();
     }
 
@@ -306,7 +306,7 @@ impl ApplicationHandler<Stop> for App<'_> {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // While the window system is still there.
+        // Must happen before the window system shuts down.
         self.open = None;
     }
 }

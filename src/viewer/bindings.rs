@@ -1,4 +1,4 @@
-//! What keys and mouse do: one table, from which events are answered and the help is written.
+//! Key and mouse bindings: one table for event handling and for the help overlay.
 
 use std::fmt;
 
@@ -8,55 +8,55 @@ use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 
 use crate::lod;
 
-/// What happens.
+/// An action of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
-    /// While held, the camera moves: right, up, forward.
+    /// Moves the camera while held: right, up, forward.
     Move(DVec3),
-    /// While held, the camera moves faster.
+    /// Speeds up movement while held.
     Fast,
-    /// The camera turns with the mouse.
-    Look,
-    /// The camera's speed changes; in orbit its distance, and the width of an orthographic picture.
+    /// Turns the camera with the mouse.
+    Turn,
+    /// Changes the camera's speed; the distance in orbit mode; the image width of an orthographic view.
     Speed,
-    /// The next way to move: fly, orbit, walk.
+    /// Switches to the next camera mode: fly, orbit, walk.
     Camera,
-    /// The camera goes back to where it was at the start.
+    /// Returns the camera to its start.
     Home,
-    /// This row of the table of techniques draws.
+    /// Selects a technique by its index in the table.
     Technique(usize),
-    /// The technique's next variant draws.
+    /// Selects the technique's next variant.
     Variant,
-    /// The tolerance is multiplied.
+    /// Multiplies the tolerance.
     Tolerance(f64),
-    /// Edges only, or faces.
+    /// Toggles wireframe.
     Wireframe,
-    /// Colours by level of detail, or back.
+    /// Toggles colours by level of detail.
     LevelColours,
-    /// The next thing that colours say.
+    /// Selects the next colour mode.
     Colour,
-    /// What is drawn stays chosen for this view, or follows again.
+    /// Toggles a frozen draw list, while the camera still moves.
     Freeze,
-    /// The frame goes to a file.
+    /// Saves the next frame to a file.
     Screenshot,
-    /// Numbers are shown, or not.
+    /// Toggles the statistics.
     Hud,
-    /// Help is shown, or not.
+    /// Toggles the help.
     Help,
-    /// The end.
+    /// Ends the program.
     Quit,
 }
 
-/// What makes it happen.
+/// An input that triggers an action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// The key at this place, whatever it says: for hands that lie on WASD.
-    At(KeyCode),
-    /// The key that says this.
-    Says(&'static str),
+    /// The key at a physical position, independent of the keyboard layout (WASD).
+    Position(KeyCode),
+    /// The key that produces a character in the user's layout.
+    Character(&'static str),
     /// A key without a character.
     Named(NamedKey),
-    /// The mouse, moved while a button is held.
+    /// Mouse movement while a button is held.
     Drag,
     /// The mouse's wheel.
     Wheel,
@@ -65,25 +65,25 @@ pub enum Trigger {
 /// One row of the table.
 #[derive(Clone, Debug)]
 pub struct Binding {
-    /// Any of these makes it happen.
+    /// Alternative triggers.
     pub triggers: Vec<Trigger>,
-    /// What happens, in words.
+    /// Description for the help overlay.
     pub about: String,
-    /// What happens.
+    /// Action.
     pub action: Action,
 }
 
-/// The whole table.
+/// Returns all bindings.
 pub fn table() -> Vec<Binding> {
     use Action as A;
-    use Trigger::{At, Drag, Named, Says, Wheel};
+    use Trigger::{Character, Drag, Named, Position, Wheel};
     let row = |triggers: &[Trigger], about: &str, action| Binding {
         triggers: triggers.to_vec(),
         about: about.to_string(),
         action,
     };
     let moves = |place, arrow: Option<KeyCode>, about, direction| {
-        let triggers: Vec<_> = [Some(place), arrow].into_iter().flatten().map(At).collect();
+        let triggers: Vec<_> = [Some(place), arrow].into_iter().flatten().map(Position).collect();
         row(&triggers, about, A::Move(direction))
     };
     let mut rows = vec![
@@ -93,11 +93,11 @@ pub fn table() -> Vec<Binding> {
         moves(KeyCode::KeyD, Some(KeyCode::ArrowRight), "right", DVec3::X),
         moves(KeyCode::KeyE, None, "up", DVec3::Y),
         moves(KeyCode::KeyQ, None, "down", DVec3::NEG_Y),
-        row(&[At(KeyCode::ShiftLeft), At(KeyCode::ShiftRight)], "faster", A::Fast),
-        row(&[Drag], "look around", A::Look),
+        row(&[Position(KeyCode::ShiftLeft), Position(KeyCode::ShiftRight)], "move faster", A::Fast),
+        row(&[Drag], "look around", A::Turn),
         row(&[Wheel], "speed; distance in orbit; width with --ortho", A::Speed),
         row(&[Named(NamedKey::Tab)], "camera: fly, orbit, walk", A::Camera),
-        row(&[Named(NamedKey::Home)], "back to the start", A::Home),
+        row(&[Named(NamedKey::Home)], "camera back to the start", A::Home),
     ];
     let digits = [
         (KeyCode::Digit1, KeyCode::Numpad1),
@@ -111,19 +111,19 @@ pub fn table() -> Vec<Binding> {
         (KeyCode::Digit9, KeyCode::Numpad9),
     ];
     for (k, (entry, (digit, pad))) in lod::TECHNIQUES.iter().zip(digits).enumerate() {
-        rows.push(row(&[At(digit), At(pad)], &format!("technique: {}", entry.name), A::Technique(k)));
+        rows.push(row(&[Position(digit), Position(pad)], &format!("technique: {}", entry.name), A::Technique(k)));
     }
     rows.extend([
-        row(&[Says("v")], "next variant of the technique", A::Variant),
-        row(&[Says("+"), Says("=")], "tolerance up: coarser", A::Tolerance(std::f64::consts::SQRT_2)),
-        row(&[Says("-")], "tolerance down: finer", A::Tolerance(std::f64::consts::FRAC_1_SQRT_2)),
-        row(&[Says("f")], "wireframe", A::Wireframe),
-        row(&[Says("l")], "level colours", A::LevelColours),
-        row(&[Says("c")], "next colours", A::Colour),
-        row(&[Says("z")], "freeze the selection", A::Freeze),
-        row(&[Says("p"), Named(NamedKey::F12)], "screenshot", A::Screenshot),
-        row(&[Says("u")], "numbers on or off", A::Hud),
-        row(&[Says("h"), Named(NamedKey::F1)], "this help", A::Help),
+        row(&[Character("v")], "next variant of the technique", A::Variant),
+        row(&[Character("+"), Character("=")], "tolerance up: coarser", A::Tolerance(std::f64::consts::SQRT_2)),
+        row(&[Character("-")], "tolerance down: finer", A::Tolerance(std::f64::consts::FRAC_1_SQRT_2)),
+        row(&[Character("f")], "wireframe", A::Wireframe),
+        row(&[Character("l")], "level colours", A::LevelColours),
+        row(&[Character("c")], "next colour mode", A::Colour),
+        row(&[Character("z")], "freeze the selection", A::Freeze),
+        row(&[Character("p"), Named(NamedKey::F12)], "screenshot", A::Screenshot),
+        row(&[Character("u")], "statistics on or off", A::Hud),
+        row(&[Character("h"), Named(NamedKey::F1)], "this help", A::Help),
         row(&[Named(NamedKey::Escape)], "quit", A::Quit),
     ]);
     rows
@@ -132,8 +132,8 @@ pub fn table() -> Vec<Binding> {
 impl Trigger {
     fn is(&self, event: &KeyEvent) -> bool {
         match self {
-            Trigger::At(code) => event.physical_key == PhysicalKey::Code(*code),
-            Trigger::Says(text) => matches!(&event.logical_key, Key::Character(c) if c.to_lowercase() == *text),
+            Trigger::Position(code) => event.physical_key == PhysicalKey::Code(*code),
+            Trigger::Character(text) => matches!(&event.logical_key, Key::Character(c) if c.to_lowercase() == *text),
             Trigger::Named(name) => event.logical_key == Key::Named(*name),
             Trigger::Drag | Trigger::Wheel => false,
         }
@@ -143,13 +143,13 @@ impl Trigger {
 impl fmt::Display for Trigger {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Trigger::At(code) => {
+            Trigger::Position(code) => {
                 let name = format!("{code:?}");
                 let parts = ["Key", "Digit", "Arrow"];
                 let name = parts.iter().find_map(|part| name.strip_prefix(part)).unwrap_or(&name);
                 f.write_str(name)
             }
-            Trigger::Says(text) => f.write_str(&text.to_uppercase()),
+            Trigger::Character(text) => f.write_str(&text.to_uppercase()),
             Trigger::Named(NamedKey::Escape) => f.write_str("Esc"),
             Trigger::Named(name) => write!(f, "{name:?}"),
             Trigger::Drag => f.write_str("drag"),
@@ -159,25 +159,25 @@ impl fmt::Display for Trigger {
 }
 
 impl Binding {
-    /// Its triggers in words.
+    /// Returns the triggers as text for the help overlay.
     pub fn keys(&self) -> String {
-        // The number pad and the right-hand twins do the same as their brothers.
-        let position_check = |t: &&Trigger| {
+        // Number-pad keys and the right Shift key duplicate others.
+        let is_duplicate = |t: &&Trigger| {
             let name = format!("{t:?}");
             name.contains("Numpad") || name.contains("Right)") && name.contains("Shift")
         };
-        let keys = self.triggers.iter().filter(|t| !position_check(t)).map(Trigger::to_string);
+        let keys = self.triggers.iter().filter(|t| !is_duplicate(t)).map(Trigger::to_string);
         keys.map(|key| key.replace("ShiftLeft", "Shift")).collect::<Vec<_>>().join("  ")
     }
 }
 
-/// What a key does.
-pub fn of_key(table: &[Binding], event: &KeyEvent) -> Option<Action> {
+/// Returns the action of a key event.
+pub fn action_of_key(table: &[Binding], event: &KeyEvent) -> Option<Action> {
     table.iter().find(|row| row.triggers.iter().any(|t| t.is(event))).map(|row| row.action)
 }
 
-/// What something without a key does.
-pub fn of(table: &[Binding], trigger: Trigger) -> Option<Action> {
+/// Returns the action of a mouse trigger.
+pub fn action_of(table: &[Binding], trigger: Trigger) -> Option<Action> {
     table.iter().find(|row| row.triggers.contains(&trigger)).map(|row| row.action)
 }
 
@@ -186,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_trigger_means_one_thing_and_every_technique_has_a_key() {
+    fn triggers_are_unique_and_every_technique_has_a_key() {
         let rows = table();
         let triggers: Vec<_> = rows.iter().flat_map(|row| &row.triggers).collect();
         for (k, trigger) in triggers.iter().enumerate() {

@@ -1,76 +1,76 @@
-//! The camera: flies, circles a point, or walks. Its position stays finite and near the terrain for every input.
+//! The camera: flies, orbits a point, or walks. Its position stays finite and near the terrain for any input.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::site::Site;
 use crate::view::{Lens, View, default_near};
 
-/// Height of a walker's eyes, metres.
+/// Eye height of a walker, metres.
 const EYE_HEIGHT: f64 = 1.7;
-/// The closest that a flight comes to the ground, metres.
+/// Minimum height of a flight above the ground, metres.
 const CLEARANCE: f64 = 1.0;
-/// The closest that an orbit comes to its focus, metres.
+/// Minimum distance of an orbit from its focus, metres.
 const CLOSEST: f64 = 2.0;
-/// A flight is at least as fast as at this height, metres.
+/// Height below which the flight speed no longer falls, metres.
 const LOWEST: f64 = 5.0;
-/// The longest step, seconds: after a pause the camera does not leap.
+/// Maximum time step, seconds, so that the camera does not jump after a pause.
 const LONGEST_STEP: f64 = 0.1;
-/// A flight covers this many times its height above ground in a second, or the width of an orthographic picture.
+/// Flight speed per second, as a multiple of the height above ground or of the width of an orthographic image.
 const FLIGHT_PER_HEIGHT: f64 = 0.7;
-/// A walk, metres a second: brisk.
+/// Walking speed, metres per second.
 const WALK: f64 = 6.0;
-/// What `fast` multiplies.
+/// Speed factor of `fast`.
 const FAST: f64 = 6.0;
-/// The factor on a distance or a width that one notch of the wheel makes.
+/// Factor on a distance or width per notch of the wheel.
 const NOTCH: f64 = 0.85;
-/// The smallest width of an orthographic picture, metres.
+/// Minimum width of an orthographic image, metres.
 const NARROWEST: f64 = 1e-3;
 
-/// How the camera moves.
+/// Camera mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mode {
-    /// Along its own axes.
+    /// Moves along the camera's axes.
     Fly,
-    /// Around a point.
+    /// Circles a point.
     Orbit {
-        /// The point.
+        /// The point, world metres.
         focus: DVec3,
     },
-    /// On the ground.
+    /// Walks on the ground.
     Walk,
 }
 
-/// What the user wants in one frame.
+/// User input of one frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Motion {
     /// Right, up, forward; −1 to 1 each.
     pub drive: DVec3,
-    /// Much faster.
+    /// True to move at [`FAST`] times the speed.
     pub fast: bool,
-    /// Turn right and down, degrees.
+    /// Turn to the right and down, degrees.
     pub turn: DVec2,
-    /// Notches of the wheel, away from the user positive.
+    /// Notches of the wheel, positive away from the user.
     pub wheel: f64,
 }
 
-/// Where the eye is and how it moves. Lengths of a person are times [`Site::scale`].
+/// Position and mode of the camera. Lengths in human scale are multiplied by [`Site::scale`].
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     /// Position, world metres.
     pub eye: DVec3,
-    /// How it moves.
+    /// Camera mode.
     pub mode: Mode,
     yaw: f64,
     pitch: f64,
     roll: f64,
-    /// The wheel's share in the speed.
+    /// Speed factor set with the wheel.
     factor: f64,
-    /// Width of an orthographic picture, metres.
+    /// Width of an orthographic image, metres; `None` in perspective.
     width: Option<f64>,
 }
 
 impl Camera {
-    /// The camera of a view.
+    /// Creates a camera at a view.
     pub fn of(view: &View) -> Self {
         let forward = view.forward();
         let yaw = forward.z.atan2(forward.x).to_degrees();
@@ -84,14 +84,14 @@ impl Camera {
         Self { eye: view.eye, mode: Mode::Fly, yaw, pitch, roll, factor: 1.0, width }
     }
 
-    /// The rotation of a view.
+    /// Returns the rotation of the view.
     pub fn world_from_eye(&self) -> DMat3 {
         View::turned(self.yaw, self.pitch, self.roll)
     }
 
-    /// A view with this eye, its near plane where `near` or the height above ground says. An orthographic one is as
-    /// wide as the camera says, and its far plane lies beyond all terrain.
-    pub fn seen(&self, site: &Site, start: &View, near: Option<f64>) -> View {
+    /// Returns the view of the camera; size and tolerance come from `start`. The near plane is at `near` metres, or
+    /// follows the height above ground. An orthographic far plane lies beyond all terrain.
+    pub fn view(&self, site: &Site, start: &View, near: Option<f64>) -> View {
         let near = near.unwrap_or_else(|| default_near(self.above_ground(site), site.diagonal()));
         let lens = match self.width {
             Some(width) => Lens::Orthographic { width, far: near + 2.0 * site.farthest(self.eye) },
@@ -100,12 +100,12 @@ impl Camera {
         View { eye: self.eye, world_from_eye: self.world_from_eye(), lens, near, ..*start }
     }
 
-    /// Width of the picture, metres, if it is orthographic.
+    /// Returns the width of an orthographic image, metres.
     pub fn width(&self) -> Option<f64> {
         self.width
     }
 
-    /// The name of the way it moves.
+    /// Returns the name of the mode.
     pub fn mode_name(&self) -> &'static str {
         match self.mode {
             Mode::Fly => "fly",
@@ -114,12 +114,12 @@ impl Camera {
         }
     }
 
-    /// Height above the ground, or above the field's edge nearest to it, metres.
+    /// Returns the height above the ground, or above the nearest edge of the field, metres.
     pub fn above_ground(&self, site: &Site) -> f64 {
         self.eye.y - site.ground(self.eye)
     }
 
-    /// Metres a second.
+    /// Returns the speed, metres per second.
     pub fn speed(&self, site: &Site) -> f64 {
         let flight = || match self.width {
             Some(width) => width,
@@ -133,21 +133,21 @@ impl Camera {
             }
     }
 
-    /// Goes over to the next way to move.
+    /// Switches to the next mode.
     pub fn next_mode(&mut self, site: &Site) {
         self.factor = 1.0;
         self.mode = match self.mode {
-            Mode::Fly => Mode::Orbit { focus: site.looked_at(self.eye, self.forward()) },
+            Mode::Fly => Mode::Orbit { focus: site.ray_hit(self.eye, self.forward()) },
             Mode::Orbit { .. } => Mode::Walk,
             Mode::Walk => Mode::Fly,
         };
         if self.mode == Mode::Walk {
             (self.pitch, self.roll) = (self.pitch.clamp(-10.0, 10.0), 0.0);
         }
-        self.settle(site);
+        self.clamp_to_terrain(site);
     }
 
-    /// Moves for `dt` seconds.
+    /// Moves the camera for `dt` seconds.
     pub fn advance(&mut self, site: &Site, motion: &Motion, dt: f64) {
         let before = *self;
         let dt = if dt.is_finite() { dt.clamp(0.0, LONGEST_STEP) } else { 0.0 };
@@ -161,18 +161,18 @@ impl Camera {
         self.turn(motion.turn);
         match self.mode {
             Mode::Fly => {
-                // Along parallel rays nothing comes closer: there the width changes instead.
+                // Moving along parallel rays changes nothing; the width changes instead.
                 let ahead = if self.width.is_some() { 0.0 } else { -1.0 };
                 self.eye += self.world_from_eye() * (motion.drive * DVec3::new(1.0, 1.0, ahead)) * step;
             }
-            Mode::Orbit { focus } => self.circle(site, focus, motion, fast * dt),
+            Mode::Orbit { focus } => self.orbit(site, focus, motion, fast * dt),
             Mode::Walk => {
                 let level = View::turned(self.yaw, 0.0, 0.0);
                 self.eye += level * (motion.drive * DVec3::new(1.0, 0.0, -1.0)) * step;
             }
         }
         if self.mode == Mode::Walk || self.eye != before.eye {
-            self.settle(site);
+            self.clamp_to_terrain(site);
         }
         let is_finite = self.eye.is_finite() && self.width.is_none_or(f64::is_finite);
         if !(is_finite && self.yaw.is_finite() && self.pitch.is_finite() && self.factor.is_finite()) {
@@ -187,8 +187,8 @@ impl Camera {
         }
     }
 
-    /// Makes an orthographic picture narrower or wider, within what shows some terrain. A width beyond that, given at
-    /// the start, stays until it is changed.
+    /// Changes the width of an orthographic image, within the range that shows terrain. A larger width given at the
+    /// start is kept until it is changed.
     fn zoom(&mut self, site: &Site, motion: &Motion, dt: f64) {
         let Some(width) = self.width else { return };
         let (narrowest, widest) = (NARROWEST * site.scale(), 2.0 * site.reach());
@@ -196,7 +196,7 @@ impl Camera {
         self.width = Some((width * wider).clamp(narrowest.min(width), widest.max(width)));
     }
 
-    fn circle(&mut self, site: &Site, focus: DVec3, motion: &Motion, dt: f64) {
+    fn orbit(&mut self, site: &Site, focus: DVec3, motion: &Motion, dt: f64) {
         const DEGREES_A_SECOND: f64 = 45.0;
         self.turn(DVec2::new(-motion.drive.x, motion.drive.y) * DEGREES_A_SECOND * dt);
         let closer = match self.width {
@@ -213,7 +213,7 @@ impl Camera {
     }
 
     /// Keeps the eye near the terrain and above it.
-    fn settle(&mut self, site: &Site) {
+    fn clamp_to_terrain(&mut self, site: &Site) {
         let margin = if self.mode == Mode::Walk { 0.0 } else { site.reach() };
         self.eye = site.within(self.eye, margin);
         let ground = site.ground(self.eye);
@@ -236,7 +236,7 @@ mod tests {
         scaled([33, 17], 1.0)
     }
 
-    /// Hills 30 m and 20 m apart and up to 100 m high, all of it times a scale.
+    /// Returns rough terrain with samples 30 m × 20 m apart, up to 100 m high, multiplied by a scale.
     fn scaled(size: [u32; 2], scale: f64) -> Site {
         let heights: Vec<_> = (0..size[0] * size[1]).map(|k| ((k * 37) % 101) as f32 * scale as f32).collect();
         let holes = Holes::none(heights.len());
@@ -256,16 +256,16 @@ mod tests {
     }
 
     #[test]
-    fn it_looks_where_the_view_looked() {
+    fn a_camera_keeps_the_rotation_of_its_view() {
         for [yaw, pitch, roll] in [[10.0, -20.0, 30.0], [-170.0, 89.0, -80.0], [0.0, -90.0, 0.0]] {
             let difference = camera(yaw, pitch, roll).world_from_eye() - View::turned(yaw, pitch, roll);
             assert!(difference.to_cols_array().iter().all(|v| v.abs() < 1e-9), "{yaw} {pitch} {roll}");
         }
     }
 
-    /// Anything a broken clock, a stuck key or a mad mouse may send.
+    /// Extreme and non-finite inputs, as from a broken clock, key or mouse.
     #[test]
-    fn it_stays_finite_and_above_the_terrain() {
+    fn any_input_keeps_the_eye_finite_and_above_the_terrain() {
         let site = site();
         let strange = [0.0, 1.0, -1.0, 1e-300, 1e9, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
         for mode in 0..3 {
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_is_no_leap_and_no_time_is_no_move() {
+    fn long_pauses_are_clamped_and_zero_time_does_not_move() {
         let site = site();
         let ahead = Motion { drive: DVec3::Z, ..Motion::default() };
         let mut still = camera(0.0, 0.0, 0.0);
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_walker_stays_on_the_ground_and_on_the_field() {
+    fn walking_stays_on_the_ground_and_inside_the_field() {
         let site = site();
         let mut camera = camera(45.0, 0.0, 0.0);
         camera.next_mode(&site);
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn an_orbit_keeps_its_distance_and_its_focus_in_the_middle() {
+    fn an_orbit_keeps_its_distance_and_faces_its_focus() {
         let site = site();
         let mut camera = camera(-90.0, -30.0, 0.0);
         camera.next_mode(&site);
@@ -332,7 +332,7 @@ mod tests {
         }
     }
 
-    /// A view of all of a terrain from the south and above, as the command line makes it where nothing is given.
+    /// The default view of the command line: all of the terrain from the south and above.
     fn whole(site: &Site, lens: Lens) -> View {
         let back = DVec3::new(0.35, 0.6, 1.0).normalize_or(DVec3::Y);
         let eye = site.middle() + back * (1.5 * site.diagonal());
@@ -349,10 +349,10 @@ mod tests {
 
     const SCALES: [f64; 9] = [1e-7, 1e-5, 1e-4, 1e-3, 0.03, 1.0, 30.0, 1e4, 1e6];
 
-    /// Millimetres or thousands of kilometres between samples, and the smallest field: every way to move shows terrain,
-    /// moves, and keeps the eye above the ground.
+    /// From millimetres to thousands of kilometres between samples, and the smallest field: every mode moves the eye
+    /// and keeps it above the ground.
     #[test]
-    fn it_moves_on_terrain_of_any_size() {
+    fn every_mode_works_on_terrain_of_any_scale() {
         for (size, scale) in SCALES.iter().flat_map(|&scale| [([33, 17], scale), ([2, 2], scale)]) {
             let site = scaled(size, scale);
             for mode in 0..3 {
@@ -362,21 +362,21 @@ mod tests {
                 let before = camera;
                 for drive in [DVec3::Z, DVec3::X, DVec3::Y, DVec3::NEG_Z] {
                     (0..30).for_each(|_| camera.advance(&site, &Motion { drive, ..Motion::default() }, 0.02));
-                    let view = camera.seen(&site, &start, None);
+                    let view = camera.view(&site, &start, None);
                     let above = camera.above_ground(&site);
                     assert!(above > 0.0 && view.near < above, "{scale} {size:?} {mode}: {above} m, near {}", view.near);
                 }
                 let moved = camera.eye.distance(before.eye) / site.diagonal();
-                // A person on a continent does not come far.
+                // Walking covers a tiny share of a continent.
                 let min = if mode == 2 { 1e-9 } else { 1e-3 };
                 assert!(moved > min && moved < 10.0, "{scale} {size:?} {mode}: {moved} diagonals");
             }
         }
     }
 
-    /// Models that are smaller alike look alike, to the near plane.
+    /// Motion and near plane scale with the model.
     #[test]
-    fn small_models_are_flown_over_alike() {
+    fn motion_scales_with_small_models() {
         let flown = |scale: f64| {
             let site = scaled([33, 17], scale);
             let start = whole(&site, Lens::Perspective { fov_x: 1.0 });
@@ -385,7 +385,7 @@ mod tests {
             for mode in 0..3 {
                 for drive in [DVec3::new(0.3, 0.1, 1.0), DVec3::NEG_X] {
                     (0..40).for_each(|_| camera.advance(&site, &Motion { drive, ..Motion::default() }, 0.05));
-                    seen.push((camera.eye / scale, camera.seen(&site, &start, None).near / scale, mode));
+                    seen.push((camera.eye / scale, camera.view(&site, &start, None).near / scale, mode));
                 }
                 camera.next_mode(&site);
             }
@@ -400,9 +400,9 @@ mod tests {
         }
     }
 
-    /// Whichever key is held and however long, an orthographic view keeps terrain in its picture and between its planes.
+    /// Holding a key for any time keeps terrain in the image and between near and far plane.
     #[test]
-    fn an_orthographic_view_keeps_the_terrain_in_sight() {
+    fn an_orthographic_view_keeps_the_terrain_in_view() {
         for scale in SCALES {
             let site = scaled([33, 17], scale);
             let start = whole(&site, Lens::Orthographic { width: site.diagonal(), far: 1.0 });
@@ -413,7 +413,7 @@ mod tests {
                     (0..mode).for_each(|_| camera.next_mode(&site));
                     for _ in 0..600 {
                         camera.advance(&site, &Motion { drive, fast: true, ..Motion::default() }, 0.05);
-                        let view = camera.seen(&site, &start, None);
+                        let view = camera.view(&site, &start, None);
                         let at = view.project(middle).expect("beyond the near plane");
                         let Lens::Orthographic { width, far } = view.lens else { panic!("it stays orthographic") };
                         assert!(view.in_picture(&at) && at.depth < far, "{scale} {mode} {drive}: {at:?} of {far} m");
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wheel_and_the_keys_change_an_orthographic_width() {
+    fn wheel_and_keys_change_an_orthographic_width() {
         let site = site();
         let start = whole(&site, Lens::Orthographic { width: 1500.0, far: 1.0 });
         for mode in 0..3 {
@@ -438,16 +438,16 @@ mod tests {
             let width = camera.width().unwrap();
             assert!((width - 1500.0 * NOTCH * NOTCH).abs() < 1e-9, "mode {mode}");
             assert!(camera.eye.distance(eye) < 1e-9, "the eye stays");
-            assert_eq!(mode == 0, camera.speed(&site) < speed, "what is seen closer is flown over slower");
+            assert_eq!(mode == 0, camera.speed(&site) < speed, "flight slows down with the width");
             camera.advance(&site, &Motion { drive: DVec3::Z, ..Motion::default() }, 0.05);
-            assert_eq!(camera.width().unwrap() < width, mode < 2, "a walker walks");
+            assert_eq!(camera.width().unwrap() < width, mode < 2, "walking does not zoom");
         }
-        // Aside it moves by its width, however high it is.
+        // Sideways speed depends on the width, not on the height.
         let mut camera = Camera::of(&start);
         let eye = camera.eye;
         camera.advance(&site, &Motion { drive: DVec3::X, ..Motion::default() }, 0.05);
         assert!((camera.eye.distance(eye) - 1500.0 * FLIGHT_PER_HEIGHT * 0.05).abs() < 1e-6);
-        // Given wider than the terrain, it stays as wide until it is changed.
+        // A width beyond the terrain is kept until it is changed.
         let wide = whole(&site, Lens::Orthographic { width: 1e9, far: 1.0 });
         let mut camera = Camera::of(&wide);
         camera.advance(&site, &Motion { drive: DVec3::X, ..Motion::default() }, 0.05);
@@ -457,10 +457,10 @@ mod tests {
     }
 
     #[test]
-    fn a_near_plane_that_is_given_stays() {
+    fn an_explicit_near_plane_is_kept() {
         let site = scaled([33, 17], 1e-4);
         let camera = Camera::of(&start());
-        assert_eq!(camera.seen(&site, &start(), Some(0.5)).near, 0.5);
-        assert!(camera.seen(&site, &start(), None).near < 1e-3);
+        assert_eq!(camera.view(&site, &start(), Some(0.5)).near, 0.5);
+        assert!(camera.view(&site, &start(), None).near < 1e-3);
     }
 }

@@ -1,7 +1,7 @@
-//! The numbers over the picture, the help, and short notes: laid out by egui, drawn by [`crate::gpu::hud`].
+//! Lays out the statistics, the help and short notes over the image with egui; [`crate::gpu::hud`] draws them.
 //!
-//! It takes no input. Every character it may show is laid out in every frame, so that the font's texture is
-//! whole from the start and never grows while frames are under way.
+//! The overlay takes no input. Every frame lays out all characters that may occur. The font texture is therefore
+//! complete from the start and never grows while frames are in flight.
 
 use std::sync::Arc;
 
@@ -19,30 +19,30 @@ const SIZE: f32 = 13.0;
 const MARGIN: f32 = 8.0;
 
 /// A name and its value.
-pub type Row = (String, String);
+pub type HudRow = (String, String);
 
-/// What is shown.
+/// Contents of the overlay.
 #[derive(Default)]
 pub struct Content<'a> {
-    /// The numbers.
-    pub rows: Vec<Row>,
-    /// The table of keys, if help is wanted.
+    /// Statistics.
+    pub rows: Vec<HudRow>,
+    /// Key bindings to list; `None` if help is off.
     pub help: Option<&'a [Binding]>,
-    /// A note.
+    /// A short note at the bottom.
     pub note: Option<&'a str>,
 }
 
-/// The overlay of one frame.
+/// The overlay of one frame, tessellated.
 pub struct Painted {
-    /// Changed textures.
+    /// Texture changes to apply before drawing.
     pub textures: TexturesDelta,
-    /// What to draw.
+    /// Meshes to draw.
     pub primitives: Vec<ClippedPrimitive>,
-    /// Pixels a point.
+    /// Pixels per egui point.
     pub pixels_per_point: f32,
 }
 
-/// Lays the content out for a window of this size in pixels.
+/// Lays out the contents for a window of `size` pixels with a display scale factor.
 pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -> Painted {
     let scale = if scale.is_finite() { scale.clamp(0.5, 8.0) } else { 1.0 };
     let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / scale);
@@ -50,27 +50,27 @@ pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -
     input.viewports.entry(ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
     context.begin_pass(input);
     let painter = context.layer_painter(LayerId::background());
-    let every: String = (' '..='~').collect();
-    let _ = painter.layout_no_wrap(every, FontId::monospace(SIZE), TEXT);
+    let characters: String = (' '..='~').collect();
+    let _ = painter.layout_no_wrap(characters, FontId::monospace(SIZE), TEXT);
     let inner = screen.shrink(MARGIN);
-    let mut taken = Rect::NOTHING;
+    let mut help_area = Rect::NOTHING;
     if let Some(bindings) = content.help {
-        let rows: Vec<Row> = bindings.iter().map(|row| (row.keys(), row.about.clone())).collect();
-        let size = fitting(&painter, inner.shrink(SIZE * 1.5), &rows);
+        let rows: Vec<HudRow> = bindings.iter().map(|row| (row.keys(), row.about.clone())).collect();
+        let size = fitting_size(&painter, inner.shrink(SIZE * 1.5), &rows);
         let table = Table::new(&painter, (screen.center(), Align2::CENTER_CENTER), Some("Keys"), &rows, size);
-        taken = table.plate;
+        help_area = table.background;
         table.paint(&painter);
     }
-    let size = fitting(&painter, inner, &content.rows);
+    let size = fitting_size(&painter, inner, &content.rows);
     let table = Table::new(&painter, (inner.min, Align2::LEFT_TOP), None, &content.rows, size);
-    // In a small window the help stands alone.
-    if !content.rows.is_empty() && !table.plate.intersects(taken) {
+    // In a small window help hides the statistics.
+    if !content.rows.is_empty() && !table.background.intersects(help_area) {
         table.paint(&painter);
     }
     if let Some(note) = content.note {
         let rows = [(note.to_string(), String::new())];
         let at = (inner.center_bottom(), Align2::CENTER_BOTTOM);
-        Table::new(&painter, at, None, &rows, fitting(&painter, inner, &rows)).paint(&painter);
+        Table::new(&painter, at, None, &rows, fitting_size(&painter, inner, &rows)).paint(&painter);
     }
     let output = context.end_pass();
     let pixels_per_point = output.pixels_per_point;
@@ -81,48 +81,48 @@ pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -
     }
 }
 
-fn joined(rows: &[Row], part: impl Fn(&Row) -> &str) -> String {
+fn join_lines(rows: &[HudRow], part: impl Fn(&HudRow) -> &str) -> String {
     rows.iter().map(part).collect::<Vec<_>>().join("\n")
 }
 
-/// The size of type at which a table fits the space: the usual one if there is room.
-fn fitting(painter: &Painter, space: Rect, rows: &[Row]) -> f32 {
+/// Returns the font size in points at which a table fits the space, at most the default size.
+fn fitting_size(painter: &Painter, space: Rect, rows: &[HudRow]) -> f32 {
     let letter = painter.layout_no_wrap("0".to_string(), FontId::monospace(SIZE), TEXT).size();
-    let longest = |part: fn(&Row) -> &String| rows.iter().map(|row| part(row).len()).max().unwrap_or(0) as f32;
+    let longest = |part: fn(&HudRow) -> &String| rows.iter().map(|row| part(row).len()).max().unwrap_or(0) as f32;
     let width = (longest(|row| &row.0) + longest(|row| &row.1)) * letter.x + 5.0 * MARGIN;
     let height = rows.len() as f32 * letter.y + 2.0 * MARGIN;
-    let room = (space.width() / width).min(space.height() / height).min(1.0);
-    // Half-point steps: fewer sizes of the font.
-    (SIZE * room * 2.0).floor().max(8.0) / 2.0
+    let scale = (space.width() / width).min(space.height() / height).min(1.0);
+    // Steps of half a point limit the number of font sizes in the texture.
+    (SIZE * scale * 2.0).floor().max(8.0) / 2.0
 }
 
-/// Where a table lies, and what it is made of.
+/// A laid-out table.
 struct Table {
-    plate: Rect,
+    background: Rect,
     title: Option<Arc<Galley>>,
     names: Arc<Galley>,
     values: Arc<Galley>,
-    /// Where the values begin, and the rows.
+    /// Offset of the values from the top left corner inside the margin.
     indent: Vec2,
 }
 
 impl Table {
-    /// Two columns under a title.
-    fn new(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, rows: &[Row], size: f32) -> Self {
+    /// Lays out two columns under an optional title.
+    fn new(painter: &Painter, (at, align): (Pos2, Align2), title: Option<&str>, rows: &[HudRow], size: f32) -> Self {
         let lay = |text: String, colour| painter.layout_no_wrap(text, FontId::monospace(size), colour);
-        let (names, values) = (lay(joined(rows, |row| &row.0), FAINT), lay(joined(rows, |row| &row.1), TEXT));
+        let (names, values) = (lay(join_lines(rows, |row| &row.0), FAINT), lay(join_lines(rows, |row| &row.1), TEXT));
         let title = title.map(|text| lay(text.to_string(), TITLE));
         let head = title.as_ref().map_or(0.0, |galley| galley.size().y * 1.4);
         let gap = if values.size().x > 0.0 { MARGIN * 2.0 } else { 0.0 };
         let indent = Vec2::new(names.size().x + gap, head);
         let inner = Vec2::new(indent.x + values.size().x, head + names.size().y);
-        Self { plate: align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN)), title, names, values, indent }
+        Self { background: align.anchor_size(at, inner + Vec2::splat(2.0 * MARGIN)), title, names, values, indent }
     }
 
-    /// Paints it on a dark plate.
+    /// Paints the table on a dark background.
     fn paint(self, painter: &Painter) {
-        painter.rect_filled(self.plate, 4.0, Color32::from_black_alpha(232));
-        let corner = self.plate.min + Vec2::splat(MARGIN);
+        painter.rect_filled(self.background, 4.0, Color32::from_black_alpha(232));
+        let corner = self.background.min + Vec2::splat(MARGIN);
         if let Some(title) = self.title {
             painter.galley(corner, title, TITLE);
         }

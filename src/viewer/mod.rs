@@ -1,4 +1,4 @@
-//! The window: a camera over the land, keys from one table, numbers over the picture.
+//! The interactive viewer: a camera over the terrain, key bindings from one table, statistics over the image.
 
 mod app;
 pub mod bindings;
@@ -21,66 +21,66 @@ use crate::lod::budget::Target;
 use crate::lod::{Entry, Settings};
 use crate::plan::Look;
 use crate::view::View;
-use app::{App, Stop};
+use app::{App, QuitEvent};
 use times::Percentiles;
 
-/// What is to be seen.
+/// Options of a viewer session.
 pub struct Setup {
-    /// The terrain's name, for the title.
+    /// Name of the terrain, for the title.
     pub name: String,
-    /// The land.
+    /// The terrain.
     pub field: Arc<Field>,
-    /// From where, and in a window of what size.
+    /// View at the start; its size is that of the window, pixels.
     pub view: View,
-    /// Near plane, metres, unless it follows the height above ground.
+    /// Distance of the near plane, metres; `None` to follow the height above ground.
     pub near: Option<f64>,
-    /// The technique and its settings.
+    /// Technique and settings at the start.
     pub technique: (&'static Entry, Settings),
-    /// What was set on that technique.
+    /// Settings given on the command line for that technique: key and value.
     pub choices: Vec<(String, String)>,
-    /// What a frame is to cost, by moving the view's tolerance.
+    /// Budget per frame, kept by adjusting the tolerance; `None` for a fixed tolerance.
     pub target: Option<Target>,
-    /// How the land looks.
+    /// Shading and colour options.
     pub look: Look,
-    /// A picture laid over it, for when the colours are its.
+    /// Overlay image for the overlay colour modes.
     pub overlay: Option<image::RgbaImage>,
-    /// Which device.
+    /// Device to use.
     pub choice: Choice,
-    /// Validation layers on.
+    /// True to enable the validation layers.
     pub validate: bool,
-    /// Frames wait for the display.
+    /// True to wait for the display's refresh.
     pub vsync: bool,
-    /// Ends after this many seconds.
+    /// Session length, seconds; `None` for unlimited.
     pub seconds: Option<f64>,
-    /// Writes a screenshot.
+    /// Function that saves a screenshot.
     pub save: fn(&Path, &image::RgbaImage) -> Result<()>,
-    /// Takes what is to be done when the user interrupts the program.
+    /// Function that registers a handler for user interrupts (Ctrl-C).
     pub on_interrupt: fn(Box<dyn FnOnce() + Send>),
 }
 
-/// How a session went.
+/// Statistics of a session.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// The device's name.
+    /// Name of the device.
     pub device: String,
-    /// Frames shown.
+    /// Number of frames shown.
     pub frames: u64,
-    /// Seconds that the window was open.
+    /// Time that the window was open, seconds.
     pub seconds: f64,
-    /// Times from frame to frame, milliseconds.
+    /// Percentiles of frame times, milliseconds.
     pub frame_ms: Percentiles,
-    /// What the validation layers said, to the end of everything.
+    /// Validation messages, including those of shutdown.
     pub messages: Vec<String>,
 }
 
 /// Opens the window and returns when it is closed.
 pub fn run(setup: &Setup) -> Result<Summary> {
-    let event_loop = EventLoop::<Stop>::with_user_event().build();
-    // The window system's own words name its source files, and nothing that helps.
+    let event_loop = EventLoop::<QuitEvent>::with_user_event().build();
+    // The window system's message names its source files only; replaced by a helpful one.
     let event_loop = event_loop.map_err(|_| anyhow!("no window: the display cannot be reached"))?;
     let proxy = event_loop.create_proxy();
     (setup.on_interrupt)(Box::new(move || {
-        let _ = proxy.send_event(Stop);
+        let _ = proxy.send_event(QuitEvent);
     }));
     let mut app = App::new(setup);
     event_loop.run_app(&mut app).context("the window system")?;

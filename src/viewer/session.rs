@@ -1,4 +1,4 @@
-//! What the user has chosen so far: camera, look, technique, tolerance; and what each action does to it.
+//! The state of a viewer session (camera, look, technique, tolerance) and the effect of each action on it.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::Setup;
 use super::bindings::Action;
 use super::camera::{Camera, Motion};
-use super::hud::Row;
+use super::hud::HudRow;
 use super::renderer::FrameStats;
 use super::site::Site;
 use super::times::Smoothed;
@@ -15,52 +15,52 @@ use crate::lod::{Entry, Settings, TECHNIQUES};
 use crate::plan::{Colour, Look};
 use crate::view::{Metric, Tolerance, View};
 
-/// How long a note stays.
+/// Time that a note is shown.
 const NOTE: Duration = Duration::from_secs(4);
 
-/// The state of the window.
+/// State of the viewer.
 pub struct Session {
     /// The camera.
     pub camera: Camera,
-    /// The terrain under it.
+    /// The terrain under the camera.
     site: Site,
-    /// How the land looks.
+    /// Shading and colour options.
     pub look: Look,
-    /// The technique.
+    /// The technique and its settings.
     pub technique: (&'static Entry, Settings),
-    /// Whether the selection stays as it is.
+    /// True if the draw list is frozen.
     pub frozen: bool,
-    /// Whether the help is shown.
-    pub helps: bool,
-    /// Whether the next frame is copied to a file.
+    /// True if the help is shown.
+    pub shows_help: bool,
+    /// True if the next frame is to be saved to a file.
     pub wants_copy: bool,
     shows_numbers: bool,
     tolerance: Tolerance,
-    /// What moves the tolerance, if anything does.
+    /// Controller of the tolerance; `None` for a fixed tolerance.
     budget: Option<Controller>,
-    /// The colours that level colours go back to.
-    plain: Colour,
+    /// Colour mode that level colours toggle back to.
+    base_colour: Colour,
     note: Option<(String, Instant)>,
     frame: Smoothed,
     select: Smoothed,
     gpu: Smoothed,
 }
 
-/// What an action asks of the device.
+/// The change to the renderer that an action requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Nothing.
+    /// No change.
     Nothing,
-    /// Pipelines for the new look.
+    /// New pipelines for the look.
     Look,
-    /// The new technique's geometry.
+    /// Preparation of the new technique.
     Technique,
-    /// The end.
+    /// End of the program.
     Quit,
 }
 
 impl Session {
-    /// As it is at the start.
+    /// Creates the state at the start of a session.
     pub fn new(setup: &Setup) -> Self {
         Self {
             camera: Camera::of(&setup.view),
@@ -68,12 +68,12 @@ impl Session {
             look: setup.look,
             technique: setup.technique.clone(),
             frozen: false,
-            helps: false,
+            shows_help: false,
             wants_copy: false,
             shows_numbers: true,
             tolerance: setup.view.tolerance,
             budget: setup.target.map(|target| Controller::new(target, setup.view.tolerance.px, RANGE_PX)),
-            plain: if setup.look.colour == Colour::Level { Colour::Height } else { setup.look.colour },
+            base_colour: if setup.look.colour == Colour::Level { Colour::Height } else { setup.look.colour },
             note: None,
             frame: Smoothed::default(),
             select: Smoothed::default(),
@@ -81,21 +81,21 @@ impl Session {
         }
     }
 
-    /// Does what is done at once; movement is for [`Camera::advance`].
+    /// Performs an immediate action. Movement is handled by [`Camera::advance`].
     pub fn perform(&mut self, setup: &Setup, action: Action) -> Request {
         match action {
-            Action::Move(_) | Action::Fast | Action::Look | Action::Speed => {}
+            Action::Move(_) | Action::Fast | Action::Turn | Action::Speed => {}
             Action::Camera => self.camera.next_mode(&self.site),
             Action::Home => self.camera = Camera::of(&setup.view),
-            Action::Technique(k) => return self.take(setup, &TECHNIQUES[k], None),
+            Action::Technique(k) => return self.set_technique(setup, &TECHNIQUES[k], None),
             Action::Variant => {
                 let (entry, settings) = &self.technique;
                 let names: Vec<_> = std::iter::once(None).chain(entry.variants.iter().map(|v| Some(v.name))).collect();
                 let current = names.iter().position(|name| *name == settings.variant()).unwrap_or(0);
-                return self.take(setup, entry, names[(current + 1) % names.len()]);
+                return self.set_technique(setup, entry, names[(current + 1) % names.len()]);
             }
             Action::Tolerance(factor) => {
-                // Who sets it by hand no longer wants it moved.
+                // A manual tolerance ends the budget control.
                 self.budget = None;
                 self.tolerance.px = (self.tolerance.px * factor).clamp(RANGE_PX[0], RANGE_PX[1]);
             }
@@ -105,25 +105,26 @@ impl Session {
             }
             Action::LevelColours => {
                 let is_level = self.look.colour == Colour::Level;
-                self.look.colour = if is_level { self.plain } else { Colour::Level };
+                self.look.colour = if is_level { self.base_colour } else { Colour::Level };
                 return Request::Look;
             }
             Action::Colour => {
-                self.look.colour = next_colour(self.look.colour, Picture::of(setup));
-                self.plain = if self.look.colour == Colour::Level { self.plain } else { self.look.colour };
+                self.look.colour = next_colour(self.look.colour, OverlayKind::of(setup));
+                self.base_colour = if self.look.colour == Colour::Level { self.base_colour } else { self.look.colour };
                 return Request::Look;
             }
             Action::Freeze => self.frozen = !self.frozen,
             Action::Screenshot => self.wants_copy = true,
             Action::Hud => self.shows_numbers = !self.shows_numbers,
-            Action::Help => self.helps = !self.helps,
+            Action::Help => self.shows_help = !self.shows_help,
             Action::Quit => return Request::Quit,
         }
         Request::Nothing
     }
 
-    fn take(&mut self, setup: &Setup, entry: &'static Entry, variant: Option<&str>) -> Request {
-        // What was set on the command line was set on its technique.
+    /// Selects a technique and variant.
+    fn set_technique(&mut self, setup: &Setup, entry: &'static Entry, variant: Option<&str>) -> Request {
+        // Settings of the command line apply to its technique only.
         let is_own = entry.name == setup.technique.0.name;
         let choices = if is_own { setup.choices.as_slice() } else { &[] };
         let settings = Settings::new(entry, variant, choices).unwrap_or_else(|_| Settings::defaults(entry));
@@ -132,7 +133,8 @@ impl Session {
         Request::Technique
     }
 
-    /// Moves the camera, and takes the last frame's figures. After a break `dt` is 0: there was no frame.
+    /// Moves the camera and records the statistics of the last frame. `dt` is the frame time in seconds, or 0 after a
+    /// pause.
     pub fn advance(&mut self, motion: &Motion, stats: &FrameStats, dt: f64) {
         self.camera.advance(&self.site, motion, dt);
         if dt == 0.0 {
@@ -142,12 +144,12 @@ impl Session {
         self.select.add(stats.select_ms, dt);
         self.gpu.add(stats.gpu_ms, dt);
         if !self.frozen {
-            self.hold(stats, dt);
+            self.update_tolerance(stats, dt);
         }
     }
 
-    /// Moves the tolerance by what the last frame cost.
-    fn hold(&mut self, stats: &FrameStats, dt: f64) {
+    /// Adjusts the tolerance by the cost of the last frame.
+    fn update_tolerance(&mut self, stats: &FrameStats, dt: f64) {
         let Some(budget) = &mut self.budget else { return };
         let cost = match budget.target() {
             Target::Triangles(_) => stats.triangles as f64,
@@ -157,43 +159,43 @@ impl Session {
         self.tolerance.px = budget.tolerance_px();
     }
 
-    /// The view of a frame.
+    /// Returns the view of a frame.
     pub fn view(&self, setup: &Setup, size: [u32; 2]) -> View {
-        View { size, tolerance: self.tolerance, ..self.camera.seen(&self.site, &setup.view, setup.near) }
+        View { size, tolerance: self.tolerance, ..self.camera.view(&self.site, &setup.view, setup.near) }
     }
 
-    /// The technique as it is written on the command line.
+    /// Returns the technique as on the command line: `name` or `name:variant`.
     pub fn technique_name(&self) -> String {
         let (entry, settings) = &self.technique;
         settings.variant().map_or(entry.name.to_string(), |variant| format!("{}:{variant}", entry.name))
     }
 
-    /// The window's title.
+    /// Returns the window's title.
     pub fn title(&self, setup: &Setup) -> String {
         format!("cuesta: {}, {}", setup.name, self.technique_name())
     }
 
-    /// Shows a note for a while.
-    pub fn tell(&mut self, text: String) {
+    /// Shows a note for [`NOTE`].
+    pub fn show_note(&mut self, text: String) {
         self.note = Some((text, Instant::now()));
     }
 
-    /// The note, while it stays.
+    /// Returns the current note.
     pub fn note(&self) -> Option<&str> {
         self.note.as_ref().filter(|(_, since)| since.elapsed() < NOTE).map(|(text, _)| text.as_str())
     }
 
-    /// What the tolerance holds.
-    fn held(&self) -> String {
+    /// Returns the budget as text.
+    fn target_text(&self) -> String {
         match self.budget.as_ref().map(Controller::target) {
             None => String::new(),
-            Some(Target::Triangles(count)) => format!(", holds {} triangles", grouped(count as u64)),
-            Some(Target::FrameMs(ms)) => format!(", holds {ms} ms"),
+            Some(Target::Triangles(count)) => format!(", target {} triangles", with_thousands(count as u64)),
+            Some(Target::FrameMs(ms)) => format!(", target {ms} ms"),
         }
     }
 
-    /// The numbers over the picture.
-    pub fn rows(&self, stats: &FrameStats) -> Vec<Row> {
+    /// Returns the statistics for the HUD.
+    pub fn rows(&self, stats: &FrameStats) -> Vec<HudRow> {
         if !self.shows_numbers {
             return Vec::new();
         }
@@ -203,24 +205,24 @@ impl Session {
         let [x, y, z] = self.camera.eye.to_array();
         let metric = if self.tolerance.metric == Metric::Certified { "certified" } else { "paper" };
         let frozen = if self.frozen { ", frozen" } else { "" };
-        // To a hundredth of the terrain at least.
+        // Resolves at least a hundredth of the terrain.
         let digits = (2.0 - self.site.diagonal().log10()).ceil().clamp(0.0, 9.0) as usize;
         let wide = self.camera.width().map(|width| format!(", {} wide", length_text(width))).unwrap_or_default();
         let wire = if self.look.wireframe { ", edges" } else { "" };
         let mut rows = vec![
-            row("frame", format!("{frame:.1} ms, {rate:.0} a second")),
+            row("frame", format!("{frame:.1} ms, {rate:.0} fps")),
             row("select", format!("{:.2} ms", self.select.get())),
             row("gpu", format!("{:.1} ms", self.gpu.get())),
-            row("triangles", grouped(stats.triangles)),
-            row("draws", grouped(stats.draws as u64)),
+            row("triangles", with_thousands(stats.triangles)),
+            row("draws", with_thousands(stats.draws as u64)),
             row("technique", format!("{}{frozen}", self.technique_name())),
             row(
                 "tolerance",
                 format!(
                     "{:.2} px {metric}{}{}",
                     self.tolerance.px,
-                    self.held(),
-                    select_within_limits(stats.tolerance_scale)
+                    self.target_text(),
+                    scale_text(stats.tolerance_scale)
                 ),
             ),
             row("colours", format!("{}{wire}", self.look.colour.name())),
@@ -236,39 +238,42 @@ impl Session {
     }
 }
 
-/// What is said of a tolerance that was not kept.
-fn select_within_limits(factor: f64) -> String {
-    if factor > 1.0 { format!(", times {factor:.2}: too much to draw") } else { String::new() }
+/// Returns a text for a tolerance that was raised to fit the draw list's limits.
+fn scale_text(factor: f64) -> String {
+    if factor > 1.0 { format!(" x {factor:.2} (draw list full)") } else { String::new() }
 }
 
-/// Where the next screenshot goes: the first free number in the current folder.
+/// Returns the first unused screenshot path in the current directory.
 pub fn free_path() -> PathBuf {
     let path = |k: u32| PathBuf::from(format!("cuesta-{k:03}.png"));
     path((1..).find(|k| !path(*k).exists()).unwrap_or(0))
 }
 
-/// The picture there is to lay over.
+/// Kind of overlay image available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Picture {
+enum OverlayKind {
+    /// No overlay.
     None,
+    /// An image that fits one texture.
     Whole,
-    InParts,
+    /// An image that needs a virtual texture.
+    Virtual,
 }
 
-impl Picture {
+impl OverlayKind {
     fn of(setup: &Setup) -> Self {
         match &setup.overlay {
-            None => Picture::None,
-            Some(picture) if setup.look.holds(picture.dimensions().into()) => Picture::Whole,
-            Some(_) => Picture::InParts,
+            None => OverlayKind::None,
+            Some(picture) if setup.look.holds(picture.dimensions().into()) => OverlayKind::Whole,
+            Some(_) => OverlayKind::Virtual,
         }
     }
 }
 
-fn next_colour(colour: Colour, picture: Picture) -> Colour {
+fn next_colour(colour: Colour, picture: OverlayKind) -> Colour {
     match colour {
-        Colour::Height if picture != Picture::None => Colour::Overlay,
-        Colour::Overlay if picture == Picture::InParts => Colour::Maps,
+        Colour::Height if picture != OverlayKind::None => Colour::Overlay,
+        Colour::Overlay if picture == OverlayKind::Virtual => Colour::Maps,
         Colour::Height | Colour::Overlay | Colour::Maps => Colour::Ground,
         Colour::Ground => Colour::Nodes,
         Colour::Nodes => Colour::Level,
@@ -279,7 +284,7 @@ fn next_colour(colour: Colour, picture: Picture) -> Colour {
     }
 }
 
-/// Metres with about two digits.
+/// Formats a length in metres with about two digits.
 fn length_text(metres: f64) -> String {
     match metres.abs() {
         size if size >= 10.0 => format!("{metres:.0} m"),
@@ -288,8 +293,8 @@ fn length_text(metres: f64) -> String {
     }
 }
 
-/// Digits in threes.
-fn grouped(value: u64) -> String {
+/// Formats a number with spaces between thousands.
+fn with_thousands(value: u64) -> String {
     let digits = value.to_string();
     let groups = digits.as_bytes().rchunks(3).rev().map(|g| String::from_utf8_lossy(g).into_owned());
     groups.collect::<Vec<_>>().join(" ")
@@ -300,20 +305,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_come_round() {
-        for (count, picture) in (8..).zip([Picture::None, Picture::Whole, Picture::InParts]) {
+    fn colour_modes_cycle() {
+        for (count, picture) in (8..).zip([OverlayKind::None, OverlayKind::Whole, OverlayKind::Virtual]) {
             let mut seen = vec![Colour::Height];
             while seen.len() < 12 && (seen.len() == 1 || seen.last() != Some(&Colour::Height)) {
                 seen.push(next_colour(seen[seen.len() - 1], picture));
             }
             assert_eq!(seen.len(), count);
-            assert_eq!(seen.contains(&Colour::Overlay), picture != Picture::None);
-            assert_eq!(seen.contains(&Colour::Maps), picture == Picture::InParts);
+            assert_eq!(seen.contains(&Colour::Overlay), picture != OverlayKind::None);
+            assert_eq!(seen.contains(&Colour::Maps), picture == OverlayKind::Virtual);
         }
     }
 
     #[test]
-    fn digits_in_threes() {
-        assert_eq!([0, 999, 1000, 12_345_678].map(grouped), ["0", "999", "1 000", "12 345 678"]);
+    fn thousands_are_separated() {
+        assert_eq!([0, 999, 1000, 12_345_678].map(with_thousands), ["0", "999", "1 000", "12 345 678"]);
     }
 }

@@ -1,4 +1,4 @@
-//! The terrain as the camera sees it: its extent, the ground under a place, and the scale of a step on it.
+//! The terrain as the camera needs it: extent, height of the ground, and human scale.
 
 use std::sync::Arc;
 
@@ -6,10 +6,10 @@ use glam::{DVec2, DVec3};
 
 use crate::height::Field;
 
-/// Terrain with a shorter diagonal is a model: lengths of a person shrink with it, metres.
+/// Terrain with a shorter diagonal, metres, is a model: lengths in human scale shrink with it.
 const MODEL_M: f64 = 20.0;
 
-/// The extent of a terrain, computed once.
+/// A field with its extent, computed once.
 #[derive(Clone, Debug)]
 pub struct Site {
     field: Arc<Field>,
@@ -22,7 +22,7 @@ pub struct Site {
 }
 
 impl Site {
-    /// Measures a field.
+    /// Computes the extent of a field.
     pub fn new(field: &Arc<Field>) -> Self {
         let [w, h] = field.size().map(|n| f64::from(n - 1));
         let [bottom, top] = field.range().map(f64::from);
@@ -36,27 +36,28 @@ impl Site {
         }
     }
 
-    /// Diagonal of the box around the terrain, metres.
+    /// Returns the diagonal of the terrain's bounding box, metres.
     pub fn diagonal(&self) -> f64 {
         2.0 * self.radius
     }
 
-    /// The largest distance from the terrain that the camera keeps to, metres.
+    /// Returns the maximum distance of the camera from the terrain, metres.
     pub fn reach(&self) -> f64 {
         2.0 * self.diagonal()
     }
 
-    /// The factor for lengths of a person: 1, or less on a model of a few metres and below.
+    /// Returns the factor for lengths in human scale: 1, or less for models.
     pub fn scale(&self) -> f64 {
         (self.low.distance(self.high) / MODEL_M).min(1.0)
     }
 
-    /// The distance from a point beyond which there is no terrain, metres.
+    /// Returns a distance from a point beyond which there is no terrain, metres.
     pub fn farthest(&self, eye: DVec3) -> f64 {
         eye.distance(self.centre) + self.radius
     }
 
-    /// Height of the ground at a place; outside the field that of the nearest edge, over a hole that of its filling.
+    /// Returns the height of the ground at a position, metres; outside the field that of the nearest edge, over a
+    /// hole the stored filling height.
     pub fn ground(&self, at: DVec3) -> f64 {
         let field = &self.field;
         let (x, z) = (at.x.clamp(self.low.x, self.high.x), at.z.clamp(self.low.y, self.high.y));
@@ -69,7 +70,7 @@ impl Site {
         })
     }
 
-    /// Moves a point to within `margin` of the field in plan.
+    /// Clamps a point to within `margin` metres of the field in plan.
     pub fn within(&self, at: DVec3, margin: f64) -> DVec3 {
         DVec3 {
             x: at.x.clamp(self.low.x - margin, self.high.x + margin),
@@ -78,8 +79,8 @@ impl Site {
         }
     }
 
-    /// The point of the terrain that a ray meets, or else the middle of the field.
-    pub fn looked_at(&self, eye: DVec3, forward: DVec3) -> DVec3 {
+    /// Returns the point where a ray hits the terrain, or the middle of the field if it misses.
+    pub fn ray_hit(&self, eye: DVec3, forward: DVec3) -> DVec3 {
         let shortest = self.scale();
         let mut at = eye;
         for _ in 0..512 {
@@ -87,7 +88,7 @@ impl Site {
             if above <= 0.0 {
                 return at;
             }
-            // The ray and the slopes are rarely steeper than this step allows for.
+            // A step of a quarter of the height above ground rarely passes through a slope.
             at += forward * (above.min(at.distance(eye).max(shortest)) * 0.25).max(0.25 * shortest);
             if at.distance(eye) > 2.0 * self.reach() {
                 break;
@@ -96,7 +97,7 @@ impl Site {
         self.middle()
     }
 
-    /// The point of the ground in the middle of the field.
+    /// Returns the ground point in the middle of the field.
     pub fn middle(&self) -> DVec3 {
         let plan = (self.low + self.high) / 2.0;
         let middle = DVec3::new(plan.x, 0.0, plan.y);

@@ -1,30 +1,30 @@
-//! Frame times: all of them counted in little room, and smoothed for reading.
+//! Frame times: a histogram of constant size for percentiles, and smoothed values for display.
 
 use serde::Serialize;
 
-/// Relative width of a class of the histogram: what a percentile may be off by.
+/// Ratio of successive class limits: the relative error of a percentile.
 const STEP: f64 = 1.02;
-/// Lower end of the first class, milliseconds.
+/// Lower limit of the first class, milliseconds.
 const FIRST_MS: f64 = 0.01;
-/// Classes: up to a quarter of an hour.
+/// Number of classes; the last one begins at about a quarter of an hour.
 const CLASSES: usize = 926;
 
-/// How many frames took how long. Its size does not grow.
+/// A histogram of frame times.
 pub struct Times {
     counts: Vec<u64>,
     max: f64,
 }
 
-/// Milliseconds that half, 95 % and 99 % of the frames stayed below, and the longest one.
+/// Percentiles and maximum of frame times, milliseconds.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Percentiles {
     /// Median.
     pub p50: f64,
-    /// 95 %.
+    /// 95th percentile.
     pub p95: f64,
-    /// 99 %.
+    /// 99th percentile.
     pub p99: f64,
-    /// Longest.
+    /// Maximum.
     pub max: f64,
 }
 
@@ -35,19 +35,19 @@ impl Default for Times {
 }
 
 impl Times {
-    /// Counts a frame.
+    /// Adds a frame time, milliseconds.
     pub fn add(&mut self, ms: f64) {
         let class = (ms / FIRST_MS).max(1.0).log(STEP) as usize;
         self.counts[class.min(CLASSES - 1)] += 1;
         self.max = self.max.max(ms);
     }
 
-    /// Frames counted.
+    /// Returns the number of frames.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// The percentiles; zeros if there was no frame.
+    /// Returns the percentiles; zeros if there was no frame.
     pub fn percentiles(&self) -> Percentiles {
         let at = |share: f64| {
             let rank = (share * self.count() as f64).ceil() as u64;
@@ -63,18 +63,18 @@ impl Times {
     }
 }
 
-/// A value smoothed over about half a second, so that it can be read.
+/// An exponentially smoothed value with a time constant of 0.5 s, for display.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Smoothed(Option<f64>);
 
 impl Smoothed {
-    /// Takes a value that stood for `dt` seconds.
+    /// Adds a value that lasted for `dt` seconds.
     pub fn add(&mut self, value: f64, dt: f64) {
         let share = 1.0 - (-dt / 0.5).exp();
         self.0 = Some(self.0.map_or(value, |old| old + (value - old) * share));
     }
 
-    /// The smoothed value; 0 before there is one.
+    /// Returns the smoothed value; 0 before the first.
     pub fn get(&self) -> f64 {
         self.0.unwrap_or(0.0)
     }
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_within_a_class() {
+    fn percentiles_are_accurate_to_a_class() {
         let mut times = Times::default();
         (1..=1000).for_each(|k| times.add(f64::from(k) / 10.0));
         let p = times.percentiles();
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn no_frame_and_absurd_frames() {
+    fn empty_and_extreme_inputs_give_finite_percentiles() {
         assert_eq!(Times::default().percentiles().p99, 0.0);
         let mut times = Times::default();
         [0.0, 1e-9, 1e9, f64::NAN].into_iter().for_each(|ms| times.add(ms));

@@ -1,4 +1,4 @@
-//! The arrows: which module may use which, where the device may be named, and how long a file may be.
+//! Tests of the architecture: allowed module dependencies, where Vulkan may be named, and the maximum file length.
 
 mod paths;
 mod words;
@@ -6,11 +6,11 @@ mod words;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Longest source file, lines.
-const LONGEST: usize = 500;
+/// Maximum lines of a source file.
+const MAX_LINES: usize = 500;
 
-/// Every module at the top of the crate, and those it may use.
-const ARROWS: &[(&str, &[&str])] = &[
+/// Every top-level module with the modules it may use.
+const DEPENDENCIES: &[(&str, &[&str])] = &[
     ("view", &[]),
     ("renamed", &[]),
     ("height", &[]),
@@ -26,7 +26,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("profile", BELOW_REPORT),
     ("stress", BELOW_REPORT),
     ("viewer", BELOW_REPORT),
-    // Rows in, pages out: it draws a report again on any machine.
+    // Reads result rows only, so that a report can be drawn on any machine.
     ("report", &["bench", "profile", "stress", "measure"]),
 ];
 
@@ -35,13 +35,13 @@ const BELOW_REPORT: &[&str] = &[
     "viewer", "renamed",
 ];
 
-/// The command line starts whatever there is, the report too.
+/// The command line may use all modules.
 const EVERYTHING: &[&str] = &[
     "view", "height", "draw", "lod", "texture", "plan", "gpu", "measure", "scene", "bench", "profile", "stress",
     "viewer", "report", "renamed",
 ];
 
-/// What is wrong with a file of `src`, each as `file:line: what`. `file` is relative to `src`.
+/// Returns the violations of a source file as `file:line: reason`. `file` is relative to `src`.
 fn violations(file: &str, text: &str) -> Vec<String> {
     let code = paths::without_comments(text);
     let module = paths::module_of(file);
@@ -51,8 +51,8 @@ fn violations(file: &str, text: &str) -> Vec<String> {
         report(1, "a file opens with //!".into());
     }
     let lines = text.lines().count();
-    if lines > LONGEST {
-        report(LONGEST + 1, format!("{lines} lines, more than {LONGEST}"));
+    if lines > MAX_LINES {
+        report(MAX_LINES + 1, format!("{lines} lines, more than {MAX_LINES}"));
     }
     for (line, target) in paths::used(&code, &module) {
         if let Some(what) = forbidden(&module, &target) {
@@ -66,31 +66,33 @@ fn violations(file: &str, text: &str) -> Vec<String> {
             }
         }
     }
-    // What tests say goes to whoever runs them.
-    let of_program =
+    // Tests may print.
+    let code_without_tests =
         if file.ends_with("tests.rs") { "" } else { code.split("#[cfg(test)]").next().unwrap_or_default() };
-    for (line, text) in of_program.lines().enumerate() {
+    for (line, text) in code_without_tests.lines().enumerate() {
         if text.contains("print!(") || text.contains("println!(") {
-            found.push(format!("src/{file}:{}: a print panics where nobody reads: cli::report says it", line + 1));
+            found.push(format!("src/{file}:{}: printing panics on a closed pipe: use cli::report", line + 1));
         }
     }
     found.dedup();
     found
 }
 
-/// Why a module may not use a path of the crate, if so.
+/// Returns the reason if a module must not use a path of the crate.
 fn forbidden(module: &[String], target: &[String]) -> Option<String> {
-    // The crate's root declares all modules, and the program's calls the command line.
+    // The crate's root may name any module.
     let (from, to) = (module.first()?, target.first()?);
     if from == to {
-        let rooms = (module.get(1)?, target.get(1)?);
-        let is_room = |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
-        let meet = from == "lod" && rooms.0 != rooms.1 && is_room(rooms.0) && is_room(rooms.1);
-        return meet.then(|| format!("technique {} uses technique {}", rooms.0, rooms.1));
+        let techniques = (module.get(1)?, target.get(1)?);
+        let is_technique =
+            |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
+        let is_forbidden =
+            from == "lod" && techniques.0 != techniques.1 && is_technique(techniques.0) && is_technique(techniques.1);
+        return is_forbidden.then(|| format!("technique {} uses technique {}", techniques.0, techniques.1));
     }
-    let known = |name: &str| ARROWS.iter().find(|(module, _)| *module == name);
+    let known = |name: &str| DEPENDENCIES.iter().find(|(module, _)| *module == name);
     match known(from) {
-        None => Some(format!("module {from} has no row in the table of arrows")),
+        None => Some(format!("module {from} has no row in the table of dependencies")),
         Some((_, allowed)) if known(to).is_some() && !allowed.contains(&to.as_str()) => {
             Some(format!("{from} may not use {to}"))
         }
@@ -99,7 +101,7 @@ fn forbidden(module: &[String], target: &[String]) -> Option<String> {
 }
 
 #[test]
-fn every_file_keeps_the_arrows() {
+fn all_files_respect_the_dependencies() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
     collect(&src, &mut files);
@@ -124,9 +126,9 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// A rule that cannot fail proves nothing: each one on a made-up file.
+/// Every rule finds an artificial violation.
 #[test]
-fn made_up_violations_are_found() {
+fn artificial_violations_are_found() {
     let cases = [
         ("view.rs", "use crate::height::Field;", "view may not use height"),
         ("draw/expand.rs", "use crate::{view::View, lod::{self, Entry}};", "draw may not use lod"),
@@ -146,22 +148,22 @@ fn made_up_violations_are_found() {
         ("gpu/frame.rs", "use super::super::lod;", "gpu may not use lod"),
         ("report/mod.rs", "use crate::gpu;", "report may not use gpu"),
         ("viewer/mod.rs", "use crate::report;", "viewer may not use report"),
-        ("cellar/mod.rs", "use crate::view::View;", "module cellar has no row in the table of arrows"),
+        ("cellar/mod.rs", "use crate::view::View;", "module cellar has no row in the table of dependencies"),
         ("lod/mod.rs", "unsafe { *p }", "`unsafe` outside gpu"),
         ("measure/mod.rs", "use ash::vk;", "`ash` outside gpu"),
-        ("view.rs", "fn f() { eprintln!(\"x\") }", "a print panics where nobody reads: cli::report says it"),
+        ("view.rs", "fn f() { eprintln!(\"x\") }", "printing panics on a closed pipe: use cli::report"),
     ];
     for (file, line, what) in cases {
         let text = format!("//! Made up.\n\n{line}\n");
         assert_eq!(violations(file, &text), [format!("src/{file}:3: {what}")]);
     }
     assert_eq!(violations("view.rs", "use glam::DVec3;\n"), ["src/view.rs:1: a file opens with //!"]);
-    let long = format!("//! Long.\n{}", "\n".repeat(LONGEST));
-    assert_eq!(violations("view.rs", &long), [format!("src/view.rs:501: 501 lines, more than {LONGEST}")]);
+    let long = format!("//! Long.\n{}", "\n".repeat(MAX_LINES));
+    assert_eq!(violations("view.rs", &long), [format!("src/view.rs:501: 501 lines, more than {MAX_LINES}")]);
 }
 
 #[test]
-fn what_is_allowed_is_not_reported() {
+fn allowed_code_is_not_reported() {
     let cases = [
         ("gpu/memory.rs", "use ash::vk;\nuse crate::draw::DrawList;\nfn f() { unsafe { g() } }"),
         (

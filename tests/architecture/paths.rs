@@ -1,6 +1,6 @@
-//! Paths within the crate, found in source text without a parser: enough for sources that rustfmt has been at.
+//! Finds paths within the crate in source text without a parser; sufficient for sources formatted by rustfmt.
 
-/// The text with line comments cut off (`://` begins none); the sources have no others.
+/// Removes line comments (`://` does not begin one). The sources have no block comments.
 pub fn without_comments(text: &str) -> String {
     let code = |line: &str| {
         let is_comment = |at: &usize| !line[..*at].ends_with(':');
@@ -10,15 +10,15 @@ pub fn without_comments(text: &str) -> String {
     text.lines().map(code).collect()
 }
 
-/// The path of the module that a file of `src` holds: `lod/geomipmap/mod.rs` is `lod::geomipmap`.
+/// Returns the module path of a file of `src`: `lod/geomipmap/mod.rs` is `lod::geomipmap`.
 pub fn module_of(file: &str) -> Vec<String> {
     let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
     let is_root = ["lib", "main"].contains(&path);
     path.split('/').filter(|_| !is_root).map(str::to_string).collect()
 }
 
-/// Every path that begins with `crate` or `super`, resolved from the crate's root, with its line. Inside an
-/// inline module `super` is resolved as in the file around it.
+/// Returns every path that begins with `crate` or `super`, resolved from the crate's root, with its line. Inside an
+/// inline module `super` resolves as in the enclosing file.
 pub fn used(code: &str, module: &[String]) -> Vec<(usize, Vec<String>)> {
     let mut found = Vec::new();
     let starts = words(code).filter(|&(at, word)| {
@@ -65,7 +65,7 @@ fn tree<'a>(text: &'a str, base: &[String], paths: &mut Vec<Vec<String>>) -> &'a
         Some(next) if !name.is_empty() => tree(next, &path, paths),
         _ => {
             paths.push(path);
-            // `*`, and a new name, belong to the path.
+            // Skips `*` and renames.
             let rest = rest.strip_prefix('*').unwrap_or(rest);
             rest.strip_prefix(" as ")
                 .map_or(rest, |new| new.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_'))
@@ -73,13 +73,13 @@ fn tree<'a>(text: &'a str, base: &[String], paths: &mut Vec<Vec<String>>) -> &'a
     }
 }
 
-/// Lines, from 1, that hold the whole word.
+/// Returns the lines, from 1, that contain the whole word.
 pub fn lines_with_word(code: &str, word: &str) -> Vec<usize> {
     let found = words(code).filter(|&(_, w)| w == word);
     found.map(|(at, _)| code[..at].matches('\n').count() + 1).collect()
 }
 
-/// Identifiers and keywords with their positions.
+/// Returns identifiers and keywords with their positions.
 fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let mut at = 0;

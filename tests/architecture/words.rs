@@ -1,9 +1,9 @@
-//! The project's vocabulary: no private words in code or text, and doc comments that say what a thing is or does.
+//! Tests of the vocabulary: no private words in code or text, and doc comments that state what an item is or does.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Words that have a term of the field in their place, in any identifier, comment or document.
+/// Words with an established replacement; banned in identifiers, comments and documents.
 const WORDS: &[&str] = &[
     "neck",
     "manner",
@@ -30,7 +30,7 @@ const WORDS: &[&str] = &[
     "tickets",
 ];
 
-/// Phrases that say nothing by themselves, in comments and documents.
+/// Vague phrases; banned in comments and documents.
 const PHRASES: &[&str] = &[
     "so many",
     "is told",
@@ -45,20 +45,20 @@ const PHRASES: &[&str] = &[
     "those who",
 ];
 
-/// First words of a doc comment that make it a riddle.
+/// First words of a doc comment that hide its subject.
 const OPENINGS: &[&str] = &[
     "What", "Who", "Whoever", "Whose", "Whatever", "Whether", "Which", "How", "Where", "When", "Why", "That", "So",
     "It",
 ];
 
-/// Folders and files that are searched. `WORDS_IN` names others, separated by commas.
+/// Files and folders to search. The environment variable `WORDS_IN` overrides them, separated by commas.
 const SEARCHED: &[&str] =
     &["src", "tests", "benches", "examples", "shaders", "docs", "build.rs", "README.md", "ARCHITECTURE.md"];
 
-/// The list itself, and the former names that documents still read and write.
+/// This list, and documents about former names.
 const EXEMPT: &[&str] = &["tests/architecture/words.rs", "src/renamed.rs", "docs/results-schema.md"];
 
-/// The private words, phrases and openings of a file, with their lines.
+/// Returns the banned words, phrases and openings of a file, with their lines.
 fn violations(file: &str, text: &str) -> Vec<String> {
     let is_document = file.ends_with(".md");
     let mut found = Vec::new();
@@ -84,7 +84,7 @@ fn violations(file: &str, text: &str) -> Vec<String> {
     found
 }
 
-/// The words of a line in lower case: identifiers are taken apart.
+/// Returns the words of a line in lower case; identifiers are split.
 fn parts(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut was_lower = false;

@@ -230,7 +230,7 @@ fn an_interrupted_suite_tells_what_it_found() {
             serde_json::from_slice(&std::fs::read(folder.path().join("kept/stress.json")).unwrap()).unwrap();
         assert_eq!(kept, told);
         assert!(
-            std::fs::read_to_string(folder.path().join("kept/index.html")).unwrap().contains("trials were not run")
+            std::fs::read_to_string(folder.path().join("kept/index.html")).unwrap().contains("runs were not executed")
         );
         return;
     }

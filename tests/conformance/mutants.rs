@@ -41,10 +41,10 @@ const MUTANTS: &[Mutant] = &[
     ("one surface", "skirts although sides are shared", "Crack", "131 × 67", |field| {
         Box::new(Changed { seams: Seams::Shared, inner: clusters(field), change: |_| () })
     }),
-    ("everything in sight is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
+    ("everything in view is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
         changed(field, drop_a_block)
     }),
-    ("everything in sight is drawn", "too narrow a frustum", "in view and not drawn", "131 × 67", |field| {
+    ("everything in view is drawn", "too narrow a frustum", "in view and not drawn", "131 × 67", |field| {
         in_another_view(field, narrower)
     }),
     ("error within tolerance", "an ε a quarter too small", "px of", "131 × 67", |field| {

@@ -51,7 +51,7 @@ fn random_cases_keep_every_invariant() {
 /// Views of fields that are too large for all views.
 const FEW_VIEWS: [&str; 3] = ["from above a corner", "straight down", "orthographic"];
 /// Invariants about coverage.
-const OF_COVERAGE: [&str; 3] = ["one surface", "everything in sight is drawn", "a wider tolerance never draws more"];
+const OF_COVERAGE: [&str; 3] = ["one surface", "everything in view is drawn", "a wider tolerance never draws more"];
 
 /// Fields whose sides are not 2^n + 1, at tolerances where coarse triangles extend beyond them, which were once drawn
 /// with holes.

@@ -7,7 +7,7 @@ use cuesta::draw::layout::Frame;
 use cuesta::draw::{DrawList, expand};
 use cuesta::height::bezier::{Bezier, LAYERS};
 use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::stress::forms::{Form, every_word};
+use cuesta::stress::forms::{TechniqueConfig, with_each_word};
 use cuesta::view::{Metric, Tolerance, View};
 use fastrand::Rng;
 
@@ -44,7 +44,7 @@ pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
 });
 
 static ENDLESS: LazyLock<Arc<Field>> = LazyLock::new(|| Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS)))));
-static FORMS: LazyLock<Vec<Form>> = LazyLock::new(|| every_word(&[]).expect("the table's own"));
+static FORMS: LazyLock<Vec<TechniqueConfig>> = LazyLock::new(|| with_each_word(&[]).expect("the table's own"));
 
 /// A number: within the field, at a sample, or far beyond all reason.
 fn number(random: &mut Rng, scale: f64) -> f64 {
@@ -83,7 +83,7 @@ fn pose(random: &mut Rng, pick: usize) -> Pose {
     }
 }
 
-fn form(pick: usize) -> &'static Form {
+fn form(pick: usize) -> &'static TechniqueConfig {
     &FORMS[pick % FORMS.len()]
 }
 

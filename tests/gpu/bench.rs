@@ -1,4 +1,4 @@
-//! A benchmark on the device: what its rows say of techniques whose errors are known.
+//! Tests of a benchmark on the GPU: its rows for techniques with known errors.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
 }
 
 #[test]
-fn rows_say_what_is_known() {
+fn rows_match_known_errors() {
     on_device(|gpu| {
         let folder = tempfile::tempdir().unwrap();
         let (times, errors) = rows(gpu, &mountains(), folder.path());
@@ -92,7 +92,7 @@ fn rows_say_what_is_known() {
             let picture = image::open(folder.path().join(worst.picture.as_ref().unwrap())).unwrap();
             assert_eq!((picture.width(), picture.height()), (160, 100));
         }
-        // The same triangles, drawn in one call or in many.
+        // The same triangles in one draw call or in many.
         let [indirect, direct] = [2, 3].map(|k| &errors[k].errors);
         assert_eq!((indirect.error_px, indirect.peers_px), (direct.error_px, direct.peers_px));
         assert!(errors[2].errors.error_px.max > errors[1].errors.error_px.max);

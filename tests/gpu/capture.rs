@@ -1,5 +1,5 @@
-//! What the device really drew: captured triangles against their expansion, the device's oracle against the exact
-//! one, and the floor's picture against the frame it stands for.
+//! Tests of measurements on the GPU: captured triangles against their CPU expansion, the GPU's error pass against the
+//! exact one, and the shading-only baseline against the frame it stands for.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, technique: &mut dyn T
     assert_same(&mut renderer, technique, field, &view, name);
 }
 
-/// What the device draws of the last list is what the list says.
+/// Asserts that the GPU draws the last list as the CPU expands it.
 fn assert_same(
     renderer: &mut SceneRenderer,
     technique: &mut dyn Technique,
@@ -57,11 +57,11 @@ fn assert_same(
 }
 
 #[test]
-fn as_drawn_is_as_expanded_to_the_bit() {
+fn captured_triangles_equal_their_cpu_expansion() {
     on_device(|gpu| {
         let terrain = Arc::new(synth::synth(synth::Kind::Fractal, [513, 400], 9));
         for field in [mountains(), as_f32(&mountains()), terrain] {
-            let rooms = [
+            let configs = [
                 ("brute-force", &[][..]),
                 ("geomipmap", &[]),
                 ("geomipmap", &["block=17", "morph=on"]),
@@ -82,7 +82,7 @@ fn as_drawn_is_as_expanded_to_the_bit() {
                 ("sorted-strips", &["level=uniform", "blend=end"]),
                 ("sorted-strips", &["level=uniform", "blend=end", "topology=strip"]),
             ];
-            for (name, settings) in rooms {
+            for (name, settings) in configs {
                 compare(gpu, &field, name, technique(&field, name, settings).as_mut());
             }
         }
@@ -94,7 +94,7 @@ fn as_drawn_is_as_expanded_to_the_bit() {
 }
 
 #[test]
-fn chunks_that_morph_and_are_rebuilt_are_as_expanded_in_every_frame() {
+fn morphing_and_rebuilt_chunks_equal_their_cpu_expansion() {
     on_device(|gpu| {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [193, 160], 9));
         let start = aslant(&field, [160, 100], 2.0);
@@ -103,32 +103,32 @@ fn chunks_that_morph_and_are_rebuilt_are_as_expanded_in_every_frame() {
             let mut renderer = renderer(gpu, &field, technique.as_mut(), &start);
             let mut rebuilt = 0;
             for k in 1..30 {
-                // Forwards, and back at twice the speed.
+                // Forwards, then back at twice the speed.
                 let along = f64::from(if k < 20 { k } else { 60 - 2 * k });
                 let view = View { eye: start.eye + start.forward() * 12.0 * along, ..start };
                 renderer.draw(technique.as_mut(), &view, Copy::Nothing).unwrap();
                 rebuilt += usize::from(!renderer.list.uploads.is_empty());
                 assert_same(&mut renderer, technique.as_mut(), &field, &view, &format!("{settings:?}, frame {k}"));
             }
-            assert!(rebuilt > 5, "{settings:?}: chunks came in {rebuilt} frames");
+            assert!(rebuilt > 5, "{settings:?}: chunks were uploaded in {rebuilt} frames");
         }
     });
 }
 
-/// How far the device's largest errors may be from the exact ones, in units in the last place of single precision.
+/// Maximum difference of the GPU's largest errors from the exact ones, in units in the last place of f32.
 const ULPS: f64 = 64.0;
 
 #[test]
-fn the_devices_error_pass_agrees_with_the_exact_one() {
+fn the_gpu_error_pass_agrees_with_the_exact_one() {
     on_device(|gpu| {
         let terrain = Arc::new(synth::synth(synth::Kind::Fractal, [700, 513], 3));
         for (field, px) in
             [(mountains(), 1.0), (as_f32(&mountains()), 6.0), (Arc::clone(&terrain), 2.0), (terrain, 12.0)]
         {
             let view = aslant(&field, [640, 400], px);
-            let rooms =
+            let configs =
                 [("geomipmap", &["block=33"][..]), ("sorted-strips", &["level=uniform", "blend=end", "page=256"])];
-            for (name, settings) in rooms {
+            for (name, settings) in configs {
                 let mut technique = technique(&field, name, settings);
                 let mut renderer = renderer(gpu, &field, technique.as_mut(), &view);
                 let there = renderer.errors(technique.as_ref(), &view).unwrap();
@@ -136,7 +136,7 @@ fn the_devices_error_pass_agrees_with_the_exact_one() {
                 for (there, here) in there.into_iter().zip([here.vertical_m, here.screen_px]) {
                     let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
                     assert!(here.max > 0.0 && here.count > 5000, "{here:?}");
-                    // Samples within rounding of the picture's border may be in or out.
+                    // Samples on the image border may be in or out by rounding.
                     assert!(near(there.count as f64, here.count as f64, 1e-3), "{there:?} {here:?}");
                     let ulp = f64::from((here.max as f32).next_up() - here.max as f32);
                     let ulps = (there.max - here.max).abs() / ulp;
@@ -151,7 +151,7 @@ fn the_devices_error_pass_agrees_with_the_exact_one() {
 }
 
 #[test]
-fn the_floor_shows_what_the_frame_showed() {
+fn the_shading_only_baseline_shows_the_same_image() {
     on_device(|gpu| {
         for field in [mountains(), as_f32(&mountains())] {
             let view = aslant(&field, [320, 200], 0.5);
@@ -159,10 +159,13 @@ fn the_floor_shows_what_the_frame_showed() {
             let mut renderer = renderer(gpu, &field, technique.as_mut(), &view);
             let (drawn, depth) = (renderer.picture(), renderer.depth());
             let covered = |p: &image::Rgba<u8>| p.0[3] > 0;
-            assert!(drawn.pixels().zip(&depth).all(|(p, &d)| covered(p) == (d > 0.0)), "land is where depth is");
+            assert!(
+                drawn.pixels().zip(&depth).all(|(p, &d)| covered(p) == (d > 0.0)),
+                "terrain and depth cover the same pixels"
+            );
             let times = renderer.draw_shading_only(&view, Copy::Picture).unwrap();
-            let floor = renderer.picture();
-            let (largest, share) = difference(&drawn, &floor, 6);
+            let baseline = renderer.picture();
+            let (largest, share) = difference(&drawn, &baseline, 6);
             assert!(share < 0.002, "{largest} at worst, {share} of the pixels differ");
             assert_eq!(times.gpu.passes.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["shading only"]);
         }

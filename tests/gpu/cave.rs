@@ -1,4 +1,4 @@
-//! A floor and a ceiling on the device.
+//! Tests of caves: a floor and a ceiling drawn on the GPU.
 
 use std::sync::Arc;
 
@@ -18,13 +18,13 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::{difference, on_device, technique};
 
-/// The floor of a cave, which stands for it.
+/// Returns the floor of a cave, which carries its ceiling.
 fn cave() -> Arc<Field> {
     let [floor, ceiling] = [Kind::CaveFloor, Kind::CaveCeiling].map(|kind| synth(kind, [257, 193], 7));
     Arc::clone(Cave::new(&floor, &ceiling, "ceiling").expect("two fields of one size").floor())
 }
 
-/// Views along the flight through it.
+/// Views along the flight through the cave.
 fn flight(field: &Field, frames: usize, px: f64) -> Vec<View> {
     let tolerance = Tolerance { px, metric: Metric::Certified };
     paths::find("cave").expect("a named path").views(field, frames, [240, 160], tolerance)
@@ -42,13 +42,13 @@ fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Tec
     Scene { gpu, field, plan: &plan, look, overlay: None }.renderer(technique, view.size).unwrap()
 }
 
-/// The share of a picture's pixels of which that is true.
+/// Returns the share of an image's pixels that satisfy `of`.
 fn share(picture: &image::RgbaImage, of: impl Fn([u8; 4]) -> bool) -> f64 {
     picture.pixels().filter(|pixel| of(pixel.0)).count() as f64 / picture.pixels().len() as f64
 }
 
 #[test]
-fn the_device_draws_the_floor_and_the_ceiling_that_the_host_expands() {
+fn the_gpu_draws_the_floor_and_ceiling_of_the_cpu_expansion() {
     on_device(|gpu| {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
@@ -73,7 +73,7 @@ fn the_device_draws_the_floor_and_the_ceiling_that_the_host_expands() {
 }
 
 #[test]
-fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
+fn a_flight_through_a_cave_shows_no_sky_through_rock() {
     on_device(|gpu| {
         let (field, look) = (cave(), Look::default());
         let mut technique = technique(&field, "sorted-strips", &[]);
@@ -83,7 +83,7 @@ fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
             let rendered = scene.render(technique.as_mut(), view, 1).unwrap();
             let truth = Truth::new(&scene, view).unwrap();
             assert_eq!(truth.hole_pixels(&scene, view, &rendered.picture).unwrap(), [0; 0], "frame {k}");
-            // The way ends at the field's rim, where the cave is open.
+            // The path ends at the field's edge, where the cave is open.
             let closed = share(&rendered.picture, |[_, _, _, a]| a > 0);
             println!("frame {k}: {closed:.3} of the pixels are rock; eye {:?}, forward {:?}", view.eye, view.forward());
             assert!(closed > if (2..6).contains(&k) { 0.9 } else { 0.3 }, "frame {k}: {closed} of the pixels are rock");
@@ -93,13 +93,14 @@ fn a_flight_through_a_cave_sees_no_sky_where_there_is_rock() {
     });
 }
 
-/// Straight up is the ceiling, whose normals point down and whose samples are the ceiling's; straight down the floor.
+/// Straight up shows the ceiling, with normals pointing down and heights of the ceiling; straight down shows the
+/// floor.
 #[test]
-fn faces_are_lit_as_what_they_are() {
+fn floor_and_ceiling_are_lit_by_their_own_normals() {
     on_device(|gpu| {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
-        // Along the axis of the view a large error is no displacement: next to no tolerance leaves none of either.
+        // Along the view axis even a large error moves no pixel; a tiny tolerance removes both.
         for view in &flight(&field, 5, 1e-9)[1..4] {
             for (pitch, points_down) in [(90.0, true), (-90.0, false)] {
                 let lens = Lens::Perspective { fov_x: 0.4 };
@@ -110,7 +111,7 @@ fn faces_are_lit_as_what_they_are() {
                     renderer.draw(technique.as_mut(), &view, Copy::Picture).unwrap();
                     renderer.picture()
                 };
-                // A normal's y from −1 to 1 is half of the light or less, or more.
+                // A normal's y is encoded as green, 188 for y = 0.
                 let normals = picture(Colour::Normal);
                 let down = share(&normals, |[_, g, _, a]| a > 0 && g < 188);
                 assert!(if points_down { down > 0.95 } else { down < 0.05 }, "{down} of the normals point down");
@@ -123,7 +124,7 @@ fn faces_are_lit_as_what_they_are() {
 }
 
 #[test]
-fn the_floor_of_the_time_is_lit_alike() {
+fn the_shading_only_baseline_lights_a_cave_alike() {
     on_device(|gpu| {
         let field = cave();
         let mut technique = technique(&field, "sorted-strips", &[]);
@@ -138,9 +139,9 @@ fn the_floor_of_the_time_is_lit_alike() {
     });
 }
 
-/// What is no cave has no ceiling on the device.
+/// A field without a ceiling allocates none on the device.
 #[test]
-fn a_ceiling_is_there_only_where_it_is_needed() {
+fn only_caves_allocate_a_ceiling() {
     on_device(|gpu| {
         let cave = cave();
         let bytes = |field: &Arc<Field>| {

@@ -1,4 +1,4 @@
-//! The ground from near: the same wherever it repeats, and gone from afar.
+//! Tests of detail textures: identical wherever the field repeats, and invisible from afar.
 
 use std::sync::Arc;
 
@@ -35,16 +35,16 @@ fn view(eye: DVec3, pitch: f64) -> View {
     }
 }
 
-/// How far neighbouring pixels differ on average.
+/// Returns the mean difference of neighbouring pixels.
 fn roughness(picture: &RgbaImage) -> f64 {
     let steps = picture.pixels().zip(picture.pixels().skip(1)).map(|(a, b)| f64::from(a.0[1].abs_diff(b.0[1])));
     steps.sum::<f64>() / f64::from(picture.width() * picture.height())
 }
 
-/// Half a million samples from the field's first one, where a float has steps of 1/32 sample, the ground under the eye
-/// is the same to the grain.
+/// Half a million samples from the field's first one, where f32 has steps of 1/32 sample, the detail under the eye is
+/// the same.
 #[test]
-fn it_repeats_with_the_field_half_a_million_samples_away() {
+fn detail_repeats_with_the_field_half_a_million_samples_away() {
     on_device(|gpu| {
         let mut tile = synth::synth(synth::Kind::Fractal, [64, 64], 3);
         tile.spacing = [16.0, 16.0];
@@ -56,16 +56,16 @@ fn it_repeats_with_the_field_half_a_million_samples_away() {
         let here = View { eye: DVec3 { y: above(&here), ..here.eye }, ..here };
         let there = View { eye: here.eye + DVec3::new(1950.0, 0.0, 1940.0) * 4096.0, ..here };
         let [a, b] = [here, there].map(|view| render(gpu, &field, true, &view));
-        assert!(roughness(&a) > 2.0, "there is something to see: {}", roughness(&a));
+        assert!(roughness(&a) > 2.0, "detail is visible: {}", roughness(&a));
         assert!(difference(&a, &b, 2).1 < 0.001, "{:?}", difference(&a, &b, 2));
-        // A metre aside it is not the same.
+        // A metre aside the detail differs.
         let aside = View { eye: there.eye + DVec3::X, ..there };
         assert!(difference(&a, &render(gpu, &field, true, &aside), 2).1 > 0.3);
     });
 }
 
 #[test]
-fn from_afar_it_fades_into_the_mean() {
+fn detail_fades_into_its_mean_from_afar() {
     on_device(|gpu| {
         let flat = Field::new(Samples::F32(vec![0.0; 129 * 129]), [129; 2], [400.0; 2], Holes::none(129 * 129));
         let field = Arc::new(flat);
@@ -78,7 +78,7 @@ fn from_afar_it_fades_into_the_mean() {
     });
 }
 
-/// However often the field repeats, the device holds as much.
+/// Device memory does not depend on the number of tiles.
 #[test]
 fn memory_does_not_grow_with_the_tiling() {
     on_device(|gpu| {

@@ -1,4 +1,4 @@
-//! Every kind of draw is executed: resident, streamed and uploaded explicit geometry, triangle lists and strips.
+//! Tests of the draw list's execution: resident, streamed and uploaded explicit geometry, as lists and strips.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use cuesta::view::View;
 
 use super::{aslant, mountains, on_device, render, technique};
 
-/// All samples as explicit vertices, brought to the device in one of several ways.
+/// A technique that draws all samples as explicit vertices, delivered in one of several ways.
 pub struct Explicit {
     mesh: Geometry,
     resident: Geometry,
@@ -20,17 +20,18 @@ pub struct Explicit {
     way: Way,
 }
 
+/// Delivery of the geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Way {
     Resident,
     Streamed,
-    /// Resident geometry that starts as nonsense and is overwritten before it is drawn.
+    /// Resident geometry, wrong at first and overwritten by uploads before it is drawn.
     Uploaded,
-    /// Streamed as one strip a row of cells.
+    /// Streamed, one strip per row of cells.
     Strips,
-    /// Resident, lit by normals of its own that start as nonsense and are overwritten before it is drawn.
+    /// Resident with vertex normals, wrong at first and overwritten by uploads before it is drawn.
     Lit,
-    /// Streamed with normals of its own.
+    /// Streamed with vertex normals.
     StreamedLit,
 }
 
@@ -47,7 +48,7 @@ impl Explicit {
         let vertices: Vec<_> = vertices
             .map(|[x, z]| {
                 let height = field.height(x as u32, z as u32);
-                // Half way between two wrong heights; exact in f32 for heights of whole halves.
+                // Morphed half way between two wrong heights; exact in f32 for multiples of 1/2.
                 ExplicitVertex {
                     position: [x, z],
                     height: height - 64.0,
@@ -143,7 +144,7 @@ impl Technique for Explicit {
     }
 }
 
-/// Heights of whole metres, so that morphing them is exact.
+/// Returns heights in whole metres, so that morphing is exact.
 fn whole_metres() -> Arc<Field> {
     let terrain = mountains();
     let heights = (0..terrain.samples().len()).map(|k| terrain.samples().height(k).round()).collect();
@@ -156,7 +157,7 @@ fn whole_metres() -> Arc<Field> {
 }
 
 #[test]
-fn explicit_geometry_draws_what_the_lattice_draws() {
+fn explicit_geometry_gives_the_same_image_as_the_lattice() {
     on_device(|gpu| {
         let field = whole_metres();
         let view = aslant(&field, [160, 120], 1.0);
@@ -168,9 +169,9 @@ fn explicit_geometry_draws_what_the_lattice_draws() {
     });
 }
 
-/// At vertices both lights are the same; between them one interpolates heights and the other normals.
+/// Vertex and texture normals agree at vertices; between them one interpolates normals, the other heights.
 #[test]
-fn normals_of_vertices_light_the_terrain_as_the_texture_does() {
+fn vertex_normals_light_terrain_like_the_normal_texture() {
     on_device(|gpu| {
         let field = whole_metres();
         let view = aslant(&field, [160, 120], 1.0);
@@ -183,9 +184,9 @@ fn normals_of_vertices_light_the_terrain_as_the_texture_does() {
     });
 }
 
-/// Strips have all diagonals one way: the outline is nearly the same, the triangles are as many.
+/// All diagonals of strips run one way: the outline is nearly the same and the number of triangles is equal.
 #[test]
-fn strips_are_drawn() {
+fn strips_give_nearly_the_same_image() {
     on_device(|gpu| {
         let field = whole_metres();
         let view = aslant(&field, [160, 120], 1.0);

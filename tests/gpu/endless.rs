@@ -1,4 +1,4 @@
-//! The land without samples on a device.
+//! Tests of endless procedural terrain, which has no samples, on the GPU.
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use glam::DVec3;
 
 use super::{aslant, on_device, render, technique};
 
-/// From far and near the picture is land below a sky, lit by slopes: no two rows of it alike.
+/// From far and near the image shows terrain below sky, with visible shading.
 #[test]
 fn the_endless_terrain_is_drawn_and_lit() {
     on_device(|gpu| {
         let field = Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))));
         let [x, z] = [0.43 * SIDE_M, 0.37 * SIDE_M];
-        let ground = field.height_at(x, z).expect("over the land");
+        let ground = field.height_at(x, z).expect("over the terrain");
         for above_m in [20_000.0, 20.0, 0.3] {
             let like = aslant(&field, [160, 120], 16.0);
             let eye = DVec3::new(x, ground + above_m, z);
@@ -26,12 +26,12 @@ fn the_endless_terrain_is_drawn_and_lit() {
                 rendered.picture.pixels().filter(|pixel| pixel.0[3] == 255).map(|p| f64::from(p.0[1])).collect();
             assert!(
                 terrain.len() > 160 * 40 && terrain.len() < 160 * 120,
-                "{above_m} m: {} pixels of land",
+                "{above_m} m: {} pixels of terrain",
                 terrain.len()
             );
             let mean = terrain.iter().sum::<f64>() / terrain.len() as f64;
             let deviation = (terrain.iter().map(|n| (n - mean).powi(2)).sum::<f64>() / terrain.len() as f64).sqrt();
-            assert!(deviation > 2.0, "{above_m} m: all land is alike, {deviation} of 255 about {mean}");
+            assert!(deviation > 2.0, "{above_m} m: the shading is uniform, {deviation} of 255 about {mean}");
         }
     });
 }

@@ -1,5 +1,5 @@
-//! Golden pictures of every technique, 96 × 64: at most 0.1 % of pixels may differ by more than 5/255.
-//! `UPDATE_GOLDEN=1` writes them anew; look at them before they are committed.
+//! Golden images of every technique, 96 × 64: at most 0.1 % of pixels may differ by more than 5/255.
+//! `UPDATE_GOLDEN=1` rewrites them; view them before committing.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use cuesta::view::View;
 
 use super::{aslant, difference, on_device, technique};
 
-/// Largest channel difference of a pixel that counts as the same.
+/// Largest channel difference of pixels that count as equal.
 const THRESHOLD: u8 = 5;
 /// Largest share of pixels that may differ by more.
 const SHARE: f64 = 0.001;
@@ -24,7 +24,7 @@ fn compare(gpu: &Arc<Gpu>, name: &str, colour: Colour, file: &str) {
 fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file: &str) {
     let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
     let mut view = aslant(&field, [96, 64], 1.0);
-    // Near the ground at one end, so that every level occurs.
+    // Close to the ground at one end, so that every level occurs.
     let statistics = field.statistics();
     view.eye = field.world_at(20.0, 270.0, f64::from(statistics.max) + 200.0);
     view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
@@ -50,7 +50,7 @@ fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file
 }
 
 #[test]
-fn every_technique_looks_as_it_did() {
+fn every_technique_matches_its_golden_image() {
     on_device(|gpu| {
         for entry in lod::TECHNIQUES {
             compare(gpu, entry.name, Colour::Height, entry.name);

@@ -1,4 +1,4 @@
-//! Selection on the device draws what the host's draws: the same instances of the same kinds, in every view.
+//! Tests of selection on the GPU: it must draw the same instances of the same kinds as on the CPU, in every view.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ const SIZE: [u32; 2] = [320, 180];
 
 type Set = Vec<([u32; 2], Vec<u32>)>;
 
-/// Instances with their kind, in an order of their own. The batch is a place in the list, and that is no matter.
+/// Returns the instances with their kind, sorted. The batch is a position in the list and is ignored.
 fn set(list: &DrawList) -> Set {
     let of_draw = |draw: &cuesta::draw::Draw| {
         let range = [draw.indices.start, draw.indices.end];
@@ -40,7 +40,7 @@ fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> Sc
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, SIZE).unwrap()
 }
 
-/// Holds both selections against each other in all views; how many instances there were.
+/// Compares both selections in all views. Returns the number of instances.
 fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, settings: &[&str], views: &[View]) -> usize {
     let mut technique = technique(field, "clusters:gpu-driven", settings);
     let mut renderer = renderer(gpu, field, technique.as_ref());
@@ -67,7 +67,7 @@ fn compare(gpu: &Arc<Gpu>, field: &Arc<Field>, settings: &[&str], views: &[View]
         let expected: Vec<_> = list.draws.iter().map(|d| (d.indices.clone(), d.instances.clone())).collect();
         assert_eq!(commands, expected, "the same commands");
         let batches = |list: &DrawList| list.instances.iter().map(|instance| instance.batch).collect::<Vec<_>>();
-        assert_eq!(batches(&renderer.list), batches(&list), "each instance knows its place");
+        assert_eq!(batches(&renderer.list), batches(&list), "batches are positions in the list");
         instances += host.len();
     }
     instances
@@ -78,7 +78,7 @@ fn random(seed: &mut u64) -> f64 {
     (*seed >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// From within the field or beside it, through a pinhole or along parallel rays, under both metrics.
+/// Returns a random view inside the field or beside it, perspective or orthographic, under either metric.
 fn anywhere(field: &Field, seed: &mut u64) -> View {
     let [w, h] = field.size().map(f64::from);
     let place = |n: f64, seed: &mut u64| n * (1.2 * random(seed) - 0.1);
@@ -103,7 +103,7 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
     }
 }
 
-/// Smooth in one half and rough in the other.
+/// A field smooth in one half and rough in the other.
 fn half_rough(size: [u32; 2]) -> Field {
     let terrain = synth::synth(synth::Kind::Fractal, size, 7);
     let mut seed = 1;
@@ -118,7 +118,7 @@ fn half_rough(size: [u32; 2]) -> Field {
 }
 
 #[test]
-fn on_every_frame_of_a_path_device_and_host_select_alike() {
+fn gpu_and_cpu_select_alike_along_paths() {
     on_device(|gpu| {
         let (demo, rough) = (Arc::new(demo::demo()), Arc::new(half_rough([600, 513])));
         for (name, field) in [("demo", demo), ("rough", rough)] {
@@ -142,7 +142,7 @@ fn on_every_frame_of_a_path_device_and_host_select_alike() {
 }
 
 #[test]
-fn from_anywhere_on_any_field_device_and_host_select_alike() {
+fn gpu_and_cpu_select_alike_from_random_views() {
     on_device(|gpu| {
         let holed = mountains();
         let tiled = |tiles| Arc::new((*holed).clone().tiled(tiles));
@@ -180,9 +180,9 @@ fn from_anywhere_on_any_field_device_and_host_select_alike() {
     });
 }
 
-/// Where more is selected than the tables hold, the device draws what the host does, under the same wider tolerance.
+/// GPU and CPU raise the tolerance equally if the selection exceeds the tables.
 #[test]
-fn more_than_fits_is_drawn_under_the_hosts_wider_tolerance() {
+fn gpu_and_cpu_raise_the_tolerance_equally() {
     on_device(|gpu| {
         let field = Arc::new(half_rough([129, 129]).tiled([60, 60]));
         let [w, h] = field.size().map(f64::from);
@@ -199,7 +199,7 @@ fn more_than_fits_is_drawn_under_the_hosts_wider_tolerance() {
             tolerance: tolerance(1e-4),
             time_s: 0.0,
         };
-        // A tolerance that fits is kept again.
+        // A tolerance that fits is unscaled again.
         let wide = View { tolerance: tolerance(400.0), ..view };
         for settings in [&["block=8"][..], &["block=8", "morph=distance"], &["block=8", "seams=skirts"]] {
             let mut technique = technique(&field, "clusters:gpu-driven", settings);
@@ -224,9 +224,9 @@ fn more_than_fits_is_drawn_under_the_hosts_wider_tolerance() {
     });
 }
 
-/// The picture is the host's, and the draws are counted.
+/// Images are equal to the CPU's, and draws are counted equally.
 #[test]
-fn pictures_and_profiles_are_those_of_the_host() {
+fn images_and_profiles_of_gpu_and_cpu_selection_are_equal() {
     on_device(|gpu| {
         let field = mountains();
         let view = super::aslant(&field, SIZE, 1.0);

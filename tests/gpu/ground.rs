@@ -1,4 +1,4 @@
-//! A ground whose texels are made where they are seen.
+//! Tests of the virtual ground texture on the GPU.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use cuesta::height::synth::{Kind, synth};
 use cuesta::plan::{Colour, Look, ScenePlan};
 use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::texture::ground::Ground;
-use cuesta::texture::working_set::Node;
+use cuesta::texture::working_set::TileId;
 use cuesta::view::{Lens, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 
 use super::{aslant, difference, on_device, technique};
 
-/// 129 × 129 samples, so that the root square is the field.
+/// A field of 129 × 129 samples, equal to its root square.
 fn field() -> Arc<Field> {
     Arc::new(synth(Kind::Fractal, [129, 129], 5))
 }
@@ -48,7 +48,7 @@ fn looking(colour: Colour) -> Look {
     Look { colour, ..Look::default() }
 }
 
-/// From straight above, four pixels a sample.
+/// A view from straight above, four pixels per sample.
 fn above(field: &Field) -> View {
     let mut view = aslant(field, [256, 192], 0.5);
     view.eye = field.world_at(60.0, 70.0, 9000.0);
@@ -62,25 +62,25 @@ fn mean(a: &RgbaImage, b: &RgbaImage) -> f64 {
     apart.sum::<f64>() / a.len() as f64
 }
 
-/// The nodes show what a picture of the whole ground shows, whoever makes the triangles.
+/// The virtual texture shows the same as one texture of the whole ground, with the triangles of any technique.
 #[test]
-fn nodes_show_the_whole_ground() {
+fn the_virtual_texture_shows_the_whole_ground() {
     on_device(|gpu| {
         let field = field();
         let view = above(&field);
-        // As fine as the nodes that the view needs.
+        // As fine as the tiles that the view needs.
         let cells = 512;
-        let tile = Ground::new(&field).tile(Node { level: 0, at: [0, 0] }, cells);
+        let tile = Ground::new(&field).tile(TileId { level: 0, at: [0, 0] }, cells);
         let whole = RgbaImage::from_fn(cells + 1, cells + 1, |x, z| Rgba(tile[(z * (cells + 1) + x) as usize]));
         let mut by_picture = renderer(gpu, &field, "sphere-tree", &looking(Colour::Overlay), Some(&whole), &view);
         let by_picture = drawn(&mut by_picture, &field, "sphere-tree", &view, false);
         for name in ["sphere-tree", "clusters:gpu-driven", "smooth-tiles"] {
             let mut in_nodes = renderer(gpu, &field, name, &looking(Colour::Ground), None, &view);
             let coarse = drawn(&mut in_nodes, &field, name, &view, false);
-            let pending = in_nodes.maps().expect("in parts").pending;
-            assert!(pending > 10, "{name}: {pending} to come");
+            let pending = in_nodes.maps().expect("a virtual texture").pending;
+            assert!(pending > 10, "{name}: {pending} pending");
             let fine = drawn(&mut in_nodes, &field, name, &view, true);
-            let stats = in_nodes.maps().expect("in parts");
+            let stats = in_nodes.maps().expect("a virtual texture");
             assert!(stats.pending == 0 && stats.held > pending && stats.texel_px == 1.0, "{name}: {stats}");
             let [coarse, fine] = [coarse, fine].map(|picture| mean(&picture, &by_picture));
             println!("{name}: {coarse:.2} from the root alone, {fine:.2} at rest; {stats}");
@@ -89,9 +89,9 @@ fn nodes_show_the_whole_ground() {
     });
 }
 
-/// On a way down to the ground the memory is what was allowed, and the nodes become smaller.
+/// On the way down to the ground the budget is kept, and the tiles become smaller.
 #[test]
-fn nodes_come_and_go_on_a_way_to_the_ground() {
+fn tiles_get_smaller_on_the_way_down_within_the_budget() {
     on_device(|gpu| {
         let field = field();
         let look = Look { texture_bytes: 12_000_000, ..looking(Colour::Nodes) };
@@ -102,9 +102,9 @@ fn nodes_come_and_go_on_a_way_to_the_ground() {
         for k in 0..8 {
             let view = View { eye: ground + (first.eye - ground) * 0.4f64.powi(k), near: 0.01, ..first };
             pictures.push(drawn(&mut renderer, &field, "sphere-tree", &view, k % 2 == 1));
-            let stats = renderer.maps().expect("in parts");
+            let stats = renderer.maps().expect("a virtual texture");
             assert!(stats.bytes <= 12_000_000 && stats.held <= stats.slots, "{stats}");
-            // A device may keep rows longer than they are.
+            // Drivers may pad rows.
             let held = gpu.device_bytes()["ground texels"];
             assert!(held <= 18_000_000, "{held} bytes");
         }
@@ -113,9 +113,9 @@ fn nodes_come_and_go_on_a_way_to_the_ground() {
     });
 }
 
-/// Who does not show the ground has no room for it on the device.
+/// Other colour modes allocate no ground texels.
 #[test]
-fn without_a_ground_there_are_no_texels() {
+fn other_colour_modes_allocate_no_ground_texels() {
     on_device(|gpu| {
         let field = field();
         let view = above(&field);

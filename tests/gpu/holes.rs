@@ -1,4 +1,4 @@
-//! What counts as a hole at the edge of a picture.
+//! Tests of the hole detection at the edge of an image.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use glam::DVec3;
 
 use super::{aslant, on_device};
 
-/// From straight above, the land's edge lies three pixels outside of the picture on one side and far outside on the
-/// other: an open pixel at the one side may be an outline within the tolerance, one at the other is a hole.
+/// Seen from straight above, the terrain's edge is three pixels outside the image on one side and far outside on the
+/// other. Within the tolerance an open pixel near the first edge may be outline; on the other side it is a hole.
 #[test]
-fn an_outline_just_outside_of_the_picture_may_come_in() {
+fn an_outline_just_outside_the_image_may_move_in() {
     on_device(|gpu| {
         let (field, look) = (Arc::new(synth::synth(synth::Kind::Fractal, [131, 97], 5)), Look::default());
         let (size, metres, outside) = ([64, 48], field.spacing[0], 3.0);
@@ -29,7 +29,7 @@ fn an_outline_just_outside_of_the_picture_may_come_in() {
         let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
         let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
         let truth = Truth::new(&scene, &view).unwrap();
-        assert!(truth.picture.pixels().all(|p| p.0[3] == 255), "land fills the picture");
+        assert!(truth.picture.pixels().all(|p| p.0[3] == 255), "terrain fills the image");
         let right = size[0] - 1;
         let open = |columns: &[u32]| {
             let mut picture = truth.picture.clone();
@@ -45,6 +45,6 @@ fn an_outline_just_outside_of_the_picture_may_come_in() {
         assert_eq!(holes(1.0, &[0, 1, 20, right]), [0, 1, 20, right], "{} pixels do not reach", outline_radius(1.0));
         assert_eq!(holes(4.0, &[0, 1, 2, 20, right]), [2, 20, right]);
         assert_eq!(holes(15.0, &[0, 1, 20, right]), [20, right]);
-        assert_eq!(holes(40.0, &[0, 20, right]), [right], "from the other side the edge is far still");
+        assert_eq!(holes(40.0, &[0, 20, right]), [right], "the edge on the other side is still too far");
     });
 }

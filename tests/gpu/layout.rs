@@ -1,4 +1,4 @@
-//! Shared structs have the same layout on the host and in the compiled SPIR-V.
+//! Tests that the structs of `draw/layout.rs` have the same offsets in the compiled SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use cuesta::draw::layout;
 use cuesta::gpu::shaders;
 use cuesta::lod::clusters;
 
-/// Offsets of the members of every named struct of a module: struct name → member name → offset.
+/// Returns the member offsets of every named struct of a module: struct name → member name → offset.
 fn offsets(words: &[u32]) -> BTreeMap<String, BTreeMap<String, u32>> {
     let text = |words: &[u32]| {
         let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();

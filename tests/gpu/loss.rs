@@ -1,5 +1,5 @@
-//! A device that is lost: an error that says so at whichever call is told first; nothing leaks, nothing is misused, and
-//! what was done before stays.
+//! Tests of device loss: an error at the first call that reports it, without leaks or invalid use; earlier results
+//! are kept.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,7 +20,8 @@ use super::memory::{Work, drawn, measured};
 use super::{on_device, technique};
 use crate::bench::mock;
 
-/// Loses the device at the first call that is told, then so many calls later, until none is left; how many there are.
+/// Loses the device at the first Vulkan call that can report it, then `step` calls later, and so on. Returns the
+/// number of calls.
 fn lose(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work, step: usize) -> u64 {
     let bytes = || gpu.device_bytes().values().sum::<u64>();
     let empty = bytes();
@@ -34,7 +35,7 @@ fn lose(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work, step: usize)
         let text = format!("{error:#}");
         assert!(text.contains("the device is lost") && !text.contains('\n'), "{name}, {calls}: {text}");
     }
-    unreachable!("it ends when nothing is lost")
+    unreachable!("ends when nothing is lost")
 }
 
 fn render(step: usize) {
@@ -63,7 +64,7 @@ fn a_loss_at_every_call_is_an_error_and_leaks_nothing() {
     render(1);
 }
 
-/// Two cases, a round and the errors of each.
+/// Runs a benchmark of two cases with one round and the errors of each.
 fn bench(gpu: &Arc<Gpu>, folder: &Path, (terrain, field): &(Terrain, Arc<Field>)) -> Result<Ended> {
     let case = |name: &str| {
         let path = mock::case(terrain, name, 2.0, "certified", "spin");
@@ -76,7 +77,7 @@ fn bench(gpu: &Arc<Gpu>, folder: &Path, (terrain, field): &(Terrain, Arc<Field>)
     Run { folder, cases, fields, rounds: 1, warm_up: 1, stop: &stop }.run(&mut backend, header, &mut |_| {})
 }
 
-/// What tells rows apart.
+/// Returns the keys of the rows written.
 fn keys(folder: &Path) -> Vec<String> {
     let key = |row: &Row| match row {
         Row::Header(_) => "header".to_string(),
@@ -86,7 +87,7 @@ fn keys(folder: &Path) -> Vec<String> {
     journal::read(folder).expect("rows").1.iter().map(key).collect()
 }
 
-/// Loses the device in a benchmark at calls so far apart, and goes on with what is kept.
+/// Loses the device in a benchmark every `step` calls, and resumes with the rows written before.
 fn resume(step: usize) {
     on_device(|gpu| {
         let field = mock::field(33);
@@ -104,10 +105,10 @@ fn resume(step: usize) {
             assert_eq!(Results::read(folder.path()).unwrap().cases.len(), found.len().min(2));
             kept[found.len()] += 1;
             let Err(error) = ended else { break };
-            let told = format!("{error:#}");
+            let message = format!("{error:#}");
             let says = [&format!("{} rows are kept", found.len()), "the device is lost"];
-            assert!(says.iter().all(|part| told.contains(*part)), "{told}");
-            assert_eq!(bench(gpu, folder.path(), &field).unwrap(), Ended::Complete, "it goes on");
+            assert!(says.iter().all(|part| message.contains(*part)), "{message}");
+            assert_eq!(bench(gpu, folder.path(), &field).unwrap(), Ended::Complete, "the benchmark resumes");
             assert_eq!(keys(folder.path()), rows, "{calls} calls");
         }
         println!("rows kept, and after how many of the calls: {kept:?}");
@@ -117,12 +118,12 @@ fn resume(step: usize) {
 }
 
 #[test]
-fn a_benchmark_keeps_its_rows_when_the_device_is_lost_and_goes_on() {
+fn a_benchmark_resumes_after_device_loss() {
     resume(97);
 }
 
 #[test]
 #[ignore = "minutes: the same at every call"]
-fn a_benchmark_lost_at_every_call_keeps_its_rows_and_goes_on() {
+fn a_benchmark_resumes_after_device_loss_at_every_call() {
     resume(1);
 }

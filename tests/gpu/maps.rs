@@ -1,4 +1,4 @@
-//! A picture in maps of its pages: the same to see as the whole, within less memory.
+//! Tests of overlay images as virtual textures: the same image as a whole texture, within less memory.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use image::{Rgba, RgbaImage};
 
 use super::{aslant, difference, mountains, on_device, technique};
 
-/// Texels a sample, and a page that is 16 samples long.
+/// Texels per sample, and the length of a page of 16 samples, metres.
 const FINE: u32 = 8;
 const PAGE_M: [f64; 2] = [16.0 * 20.0, 16.0 * 25.0];
 
@@ -20,7 +20,7 @@ fn field() -> Arc<Field> {
     Arc::new((*mountains()).clone().without_holes())
 }
 
-/// Waves of a dozen texels and more.
+/// Returns waves a dozen texels long and more.
 fn picture(field: &Field) -> RgbaImage {
     let [w, h] = field.size().map(|n| FINE * (n - 1));
     RgbaImage::from_fn(w, h, |x, z| {
@@ -40,7 +40,7 @@ fn plan(gpu: &Gpu, field: &Arc<Field>, look: &Look, picture: &RgbaImage) -> Scen
     plan.requirements(technique(field, "sorted-strips", &[]).pipeline_requirements()).build().unwrap()
 }
 
-/// A scene made ready for strips with so many bytes for the picture.
+/// Returns a renderer with sorted strips and a texture budget in bytes.
 fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, texture_bytes: u64, view: &View) -> SceneRenderer {
     let look = look(texture_bytes);
     let plan = plan(gpu, field, &look, picture);
@@ -54,10 +54,10 @@ fn drawn(renderer: &mut SceneRenderer, field: &Arc<Field>, view: &View) -> RgbaI
 }
 
 const WHOLE: u64 = 1 << 30;
-/// The whole takes 3.2 MB.
+/// A budget below the 3.2 MB of the whole image.
 const PARTS: u64 = 3_000_000;
 
-/// From straight above, so and so many metres a pixel.
+/// A view from straight above at `metres_px` metres per pixel.
 fn above(field: &Field, at: DVec3, metres_px: f64) -> View {
     let mut view = aslant(field, [320, 240], 0.5);
     view.eye = at;
@@ -66,7 +66,7 @@ fn above(field: &Field, at: DVec3, metres_px: f64) -> View {
     view
 }
 
-/// Largest and mean difference of channels, over pixels on the edge between pages and over all others.
+/// Returns the largest and mean channel difference, over pixels on page edges and over all others.
 fn differences(a: &RgbaImage, b: &RgbaImage, on_edge: impl Fn(u32, u32) -> bool) -> [(u8, f64); 2] {
     let mut found = [(0, 0.0, 0.0); 2];
     for (x, y, pixel) in a.enumerate_pixels() {
@@ -79,9 +79,9 @@ fn differences(a: &RgbaImage, b: &RgbaImage, on_edge: impl Fn(u32, u32) -> bool)
     found.map(|(largest, sum, count)| (largest, sum / f64::max(count, 1.0)))
 }
 
-/// At full resolution the picture is that of the whole, at the edges of pages as inside.
+/// A settled virtual texture shows the same image as a whole texture, at page edges as inside.
 #[test]
-fn maps_show_the_picture_without_seams() {
+fn a_virtual_texture_shows_the_image_without_seams() {
     on_device(|gpu| {
         let field = field();
         let picture = picture(&field);
@@ -90,7 +90,7 @@ fn maps_show_the_picture_without_seams() {
         let mut parts = renderer(gpu, &field, &picture, PARTS, &view);
         parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &view).unwrap();
         let in_parts = drawn(&mut parts, &field, &view);
-        let maps = parts.maps().expect("in parts");
+        let maps = parts.maps().expect("a virtual texture");
         assert!(maps.pending == 0 && maps.texel_px == 1.0 && maps.bytes <= PARTS, "{maps}");
         // North is up: x goes right and z down.
         let place = |k: usize, n: u32| {
@@ -106,9 +106,9 @@ fn maps_show_the_picture_without_seams() {
     });
 }
 
-/// What is there is drawn at once, and finer maps follow; the end is the same on every way there.
+/// Resident tiles are drawn at once and finer ones follow. The settled image does not depend on the path.
 #[test]
-fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
+fn coarse_tiles_are_drawn_at_once_and_finer_ones_follow() {
     on_device(|gpu| {
         let field = field();
         let picture = picture(&field);
@@ -120,7 +120,7 @@ fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
         parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &near).unwrap();
         let settled = drawn(&mut parts, &field, &near);
         assert!(difference(&first, &settled, 8).1 > 0.5, "the root alone shows waves of a dozen texels");
-        assert!(first.pixels().all(|pixel| pixel.0[3] == 255), "land is drawn at once");
+        assert!(first.pixels().all(|pixel| pixel.0[3] == 255), "terrain is drawn at once");
         parts.settle(technique(&field, "sorted-strips", &[]).as_mut(), &view).unwrap();
         let aslant = drawn(&mut parts, &field, &view);
         assert!(difference(&aslant, &settled, 8).1 > 0.1);
@@ -129,10 +129,10 @@ fn coarse_maps_are_there_at_once_and_finer_ones_follow() {
     });
 }
 
-/// Frames on a way, with maps made, filled in and given away while others are drawn: nothing for the validation layers to
-/// say, the memory kept, and all land covered.
+/// Tiles are generated, uploaded and evicted while frames are drawn: no validation messages, the budget kept, and all
+/// terrain covered.
 #[test]
-fn maps_come_and_go_on_a_way() {
+fn tiles_are_replaced_along_a_path_within_the_budget() {
     on_device(|gpu| {
         let field = field();
         let picture = picture(&field);

@@ -1,4 +1,4 @@
-//! Device memory that runs out: an error that says what for, wherever it happens; nothing leaks, nothing is misused.
+//! Tests of exhausted device memory: an error that names the purpose at any allocation, without leaks or invalid use.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use cuesta::scene::{Copy, Scene};
 
 use super::{aslant, on_device, technique};
 
-/// Draws a picture.
+/// Draws an image.
 pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
@@ -22,7 +22,8 @@ pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) 
     })
 }
 
-/// Measures a picture with everything that has device memory of its own: floor, capture, oracle, probe, truth.
+/// Runs all measurements with device memory of their own: shading-only baseline, capture, error pass, probe and
+/// reference image.
 pub fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
@@ -53,7 +54,7 @@ fn with_scene(
 
 pub type Work = fn(&Arc<Gpu>, &Arc<Field>, &mut dyn Technique) -> Result<()>;
 
-/// Fails the first allocation, then the second, until none is left to fail; how many there are.
+/// Fails the first allocation, then the second, and so on. Returns the number of allocations.
 fn fail_each(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work) -> u64 {
     let bytes = || gpu.device_bytes().values().sum::<u64>();
     let empty = bytes();
@@ -66,11 +67,11 @@ fn fail_each(gpu: &Arc<Gpu>, field: &Arc<Field>, name: &str, work: Work) -> u64 
         let text = format!("{error:#}");
         assert!(text.contains("out of memory") && !text.contains('\n'), "{name}, {failures}: {text}");
     }
-    unreachable!("it ends when nothing fails")
+    unreachable!("ends when nothing fails")
 }
 
 #[test]
-fn running_out_at_any_allocation_is_an_error_and_leaks_nothing() {
+fn a_failed_allocation_is_an_error_and_leaks_nothing() {
     let field = Arc::new(synth::synth(synth::Kind::Fractal, [65, 49], 3));
     on_device(|gpu| {
         for entry in TECHNIQUES {

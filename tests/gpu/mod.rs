@@ -1,5 +1,5 @@
-//! What only a device can show. Every test runs with core and synchronization validation on and fails on any
-//! message. Without a device they say so and pass, unless REQUIRE_GPU=1.
+//! Tests that need a GPU. Every test runs with core and synchronization validation and fails on any message. Without
+//! a device the tests are skipped, unless REQUIRE_GPU=1.
 
 mod bench;
 mod capture;
@@ -65,7 +65,7 @@ pub(crate) fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Bo
     (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).unwrap())
 }
 
-/// The picture of a field under a plan.
+/// Renders a field with a plan.
 fn render_planned(
     gpu: &Arc<Gpu>,
     field: &Arc<Field>,
@@ -77,7 +77,7 @@ fn render_planned(
     Scene { gpu, field, plan, look: &look, overlay: None }.render(technique, view, 1).expect("a picture")
 }
 
-/// The picture of a field with the default look.
+/// Renders a field with the default look.
 fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> RenderResult {
     let plan = ScenePlan::builder(field, &Look::default(), &gpu.device_limits())
         .requirements(technique.pipeline_requirements())
@@ -86,7 +86,7 @@ fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, vie
     render_planned(gpu, field, &plan, technique, view)
 }
 
-/// Mountains with a hole, 16-bit, not square.
+/// Mountains with a hole: 16-bit, not square.
 pub(crate) fn mountains() -> Arc<Field> {
     let terrain = synth::synth(synth::Kind::Fractal, [131, 97], 5);
     let codes = (0..terrain.samples().len()).map(|k| (terrain.samples().height(k) * 10.0).round() as u16).collect();
@@ -106,7 +106,7 @@ fn as_f32(field: &Field) -> Arc<Field> {
     Arc::new(same)
 }
 
-/// From the south-west corner over the land.
+/// A view from beyond the south-west corner over the terrain.
 pub(crate) fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
     let [w, h] = field.size().map(f64::from);
     let (low, high) = (field.world_at(0.0, 0.0, 0.0), field.world_at(w - 1.0, h - 1.0, 0.0));
@@ -125,7 +125,7 @@ pub(crate) fn aslant(field: &Field, size: [u32; 2], px: f64) -> View {
     }
 }
 
-/// The largest channel difference, and the share of pixels that differ by more than `threshold`.
+/// Returns the largest channel difference, and the share of pixels that differ by more than `threshold`.
 fn difference(a: &image::RgbaImage, b: &image::RgbaImage, threshold: u8) -> (u8, f64) {
     assert_eq!(a.dimensions(), b.dimensions());
     let pixel = |(p, q): (&image::Rgba<u8>, &image::Rgba<u8>)| {
@@ -137,11 +137,11 @@ fn difference(a: &image::RgbaImage, b: &image::RgbaImage, threshold: u8) -> (u8,
 }
 
 #[test]
-fn hole_pixels_are_sky_and_all_others_terrain() {
+fn holes_show_sky_and_all_else_terrain() {
     on_device(|gpu| {
         let field = mountains();
         let mut view = aslant(&field, [131, 97], 1.0);
-        // From straight above, a pixel a sample.
+        // From straight above, one pixel per sample.
         let [w, h] = field.size().map(|n| f64::from(n - 1));
         view.eye = field.world_at(w / 2.0, h / 2.0, 9000.0);
         view.world_from_eye = View::looking_along(DVec3::NEG_Y);
@@ -170,7 +170,7 @@ fn hole_pixels_are_sky_and_all_others_terrain() {
     });
 }
 
-/// A tolerance too small to see: the technique's picture is brute force's.
+/// At a tolerance far below a pixel the image equals that of brute force.
 #[test]
 fn a_tiny_tolerance_draws_what_brute_force_draws() {
     on_device(|gpu| {
@@ -183,12 +183,12 @@ fn a_tiny_tolerance_draws_what_brute_force_draws() {
         }
         let coarse =
             render(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &aslant(&field, [160, 120], 8.0));
-        assert_ne!(coarse.picture, truth.picture, "a wide tolerance is seen");
+        assert_ne!(coarse.picture, truth.picture, "a wide tolerance must change the image");
     });
 }
 
 #[test]
-fn ten_million_metres_from_the_origin_nothing_moves() {
+fn the_image_is_the_same_ten_million_metres_from_the_origin() {
     on_device(|gpu| {
         let field = mountains();
         let mut far = (*field).clone();
@@ -198,13 +198,13 @@ fn ten_million_metres_from_the_origin_nothing_moves() {
         let there = View { eye: here.eye + DVec3::new(1.0e7, 0.0, -6.4e6), ..here };
         let a = render(gpu, &field, technique(&field, "geomipmap", &[]).as_mut(), &here);
         let b = render(gpu, &far, technique(&far, "geomipmap", &[]).as_mut(), &there);
-        // The eye itself is rounded to 2 nm there: not a pixel may notice.
+        // The eye is rounded to 2 nm there; no pixel may change visibly.
         assert!(difference(&a.picture, &b.picture, 2).1 < 0.001);
     });
 }
 
 #[test]
-fn recorded_draws_and_indirect_ones_give_the_same_picture() {
+fn direct_and_indirect_draws_give_the_same_image() {
     on_device(|gpu| {
         let field = mountains();
         let view = aslant(&field, [160, 120], 1.0);

@@ -1,4 +1,5 @@
-//! Where a picture lies over the field, pixel by pixel: whole or in maps, over tiles, cropped, placed, from afar.
+//! Tests of an overlay image's placement over a field, pixel by pixel: whole or as a virtual texture, tiled, cropped,
+//! placed, and from afar.
 
 use std::sync::Arc;
 
@@ -13,25 +14,25 @@ use image::{Rgba, RgbaImage};
 
 use super::{aslant, difference, on_device, technique};
 
-/// Blocks of one colour along a side of the picture.
+/// Uniform blocks along a side of the image.
 const BLOCKS: u32 = 8;
 const SIZE: [u32; 2] = [160, 120];
 const STORED: [u32; 2] = [64, 64];
-/// The picture is there as a whole, or in maps.
+/// Budgets for a whole texture and for a virtual texture.
 const BYTES: [u64; 2] = [1 << 30, 1_000_000];
 
-/// Flat land of 64 × 64 samples, 10 m apart.
+/// Flat terrain of 64 × 64 samples, 10 m apart.
 fn field() -> Field {
     let count = (STORED[0] * STORED[1]) as usize;
     Field::new(Samples::F32(vec![100.0; count]), STORED, [10.0; 2], Holes::none(count))
 }
 
-/// Which of red, green and blue a block has: 1 to 7, unlike those beside it.
+/// Returns the bits of red, green and blue of a block, 1 to 7; adjacent blocks differ.
 fn code(block: [u32; 2]) -> u32 {
     (block[0] + 3 * block[1]) % 7 + 1
 }
 
-/// Blocks of the colours of their codes.
+/// Returns the image of blocks.
 fn blocks() -> RgbaImage {
     const SIDE: u32 = 512;
     RgbaImage::from_fn(SIDE, SIDE, |x, y| {
@@ -41,7 +42,7 @@ fn blocks() -> RgbaImage {
     })
 }
 
-/// From straight above a lattice position, at a number of pixels a sample.
+/// A view from straight above a lattice position at `px` pixels per sample.
 fn above(field: &Field, at: [f64; 2], px: f64) -> View {
     let mut view = aslant(field, SIZE, 0.5);
     view.eye = field.world_at(at[0], at[1], 9000.0);
@@ -55,7 +56,7 @@ fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, look: &Look, v
     let limits = gpu.device_limits();
     let plan = ScenePlan::builder(field, look, &limits).overlay(Some(picture.dimensions().into()));
     let plan = plan.requirements(technique.pipeline_requirements()).build().unwrap();
-    assert_eq!(plan.maps.is_some(), look.texture_bytes < 1 << 20, "whole, or in maps");
+    assert_eq!(plan.maps.is_some(), look.texture_bytes < 1 << 20, "whole, or virtual");
     let scene = Scene { gpu, field, plan: &plan, look, overlay: Some(picture) };
     let mut renderer = scene.renderer(technique.as_ref(), view.size).unwrap();
     renderer.settle(technique.as_mut(), view).unwrap();
@@ -63,13 +64,13 @@ fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, look: &Look, v
     renderer.picture()
 }
 
-/// The look of a picture that lies so.
+/// Returns a look with an overlay placement.
 fn look(texture_bytes: u64, drape: Option<Drape>) -> Look {
     Look { colour: Colour::Overlay, texture_bytes, drape, ..Look::default() }
 }
 
-/// Holds that each pixel shows what is expected at its lattice position: a share of the picture's sides, or the terrain's
-/// own colour where there is none.
+/// Asserts that each pixel shows the block expected at its lattice position, or the terrain's own colour. `share`
+/// returns the position in the image, 0 to 1, or `None` outside it.
 fn check(
     gpu: &Arc<Gpu>,
     field: Field,
@@ -86,7 +87,7 @@ fn check(
         for (x, y, pixel) in seen.enumerate_pixels() {
             let along = |k: usize, n: u32| at[k] + f64::from(n) + 0.5 - f64::from(SIZE[k]) / 2.0;
             let place = [along(0, x), along(1, y)];
-            // On the edge of a block or of the field either is right.
+            // Pixels on the edge of a block or of the field are skipped.
             let around = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
             let expected = around.map(|[u, v]| share([place[0] + u, place[1] + v]));
             let last = field.size().map(|n| f64::from(n - 1));
@@ -123,7 +124,7 @@ fn a_picture_lies_from_the_first_to_the_last_sample() {
     });
 }
 
-/// Also where single precision has no parts of a sample left.
+/// Includes positions where f32 no longer resolves fractions of a sample.
 #[test]
 fn a_picture_repeats_with_its_field() {
     on_device(|gpu| {
@@ -147,7 +148,7 @@ fn a_picture_is_cropped_with_its_field() {
     });
 }
 
-/// Beyond its sides is the terrain's own colour, in every tile.
+/// Beyond the image's sides the terrain has its own colour, in every tile.
 #[test]
 fn a_placed_picture_ends_at_its_sides() {
     on_device(|gpu| {
@@ -158,19 +159,19 @@ fn a_placed_picture_ends_at_its_sides() {
         let share = |p: [f64; 2]| share([p[0].rem_euclid(64.0), p[1].rem_euclid(64.0)]);
         let drape = Drape { period: STORED.map(Some), ..drape };
         check(gpu, field().tiled([8000, 4]), Some(drape), [64.0 * 7900.0, 130.0], share);
-        // Between two samples of a wide field.
+        // Sides between samples.
         let drape = Drape { first: [5.25, 12.5], length: [50.5, 40.25], period: [None; 2], ends: true };
         check(gpu, field(), Some(drape), [32.0, 24.0], |p| within([(p[0] - 5.25) / 50.5, (p[1] - 12.5) / 40.25]));
     });
 }
 
-/// From near, a tile half a million samples away shows what the first one shows.
+/// Close up, a tile half a million samples away shows the same as the first one.
 #[test]
 fn far_tiles_are_as_sharp_as_the_first() {
     on_device(|gpu| {
         let (field, picture) = (Arc::new(field().tiled([8000, 2])), blocks());
         for bytes in BYTES {
-            // A corner of four blocks in the middle of the picture.
+            // A corner of four blocks in the middle of the image.
             let [near, far] = [0.0, 64.0 * 7990.0].map(|x| above(&field, [x + 32.3, 24.1], 40.0));
             let [near, far] = [near, far].map(|view| drawn(gpu, &field, &picture, &look(bytes, None), &view));
             let (largest, share) = difference(&near, &far, 4);
@@ -181,12 +182,12 @@ fn far_tiles_are_as_sharp_as_the_first() {
     });
 }
 
-/// A picture of single black and white texels is grey from afar, in linear light.
+/// A checkerboard of single black and white texels is grey from afar, in linear light.
 #[test]
 fn fine_texels_become_their_mean() {
     on_device(|gpu| {
         let field = Arc::new(field());
-        // Odd sides: no level is half of the one before.
+        // Odd sides: no mip level is exactly half of the finer one.
         let picture =
             RgbaImage::from_fn(1531, 1531, |x, y| if (x + y) % 2 == 0 { Rgba([255; 4]) } else { Rgba([0, 0, 0, 255]) });
         let grey = RgbaImage::from_pixel(4, 4, Rgba([188, 188, 188, 255]));

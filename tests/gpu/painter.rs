@@ -1,4 +1,4 @@
-//! The painter's algorithm on the device: sorted strips drawn back to front without a depth buffer show what they show
+//! Tests of the painter's algorithm: sorted strips drawn back to front without a depth buffer give the same image as
 //! with one.
 
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub(super) fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Techn
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, size).unwrap()
 }
 
-/// A technique's lists as they are, drawn without a depth buffer.
+/// A technique's lists drawn without a depth buffer.
 struct Painted(Box<dyn Technique>);
 
 impl Technique for Painted {
@@ -46,18 +46,18 @@ impl Technique for Painted {
     }
 }
 
-/// Bytes of depth buffers that are there.
+/// Returns the bytes of all depth buffers.
 fn depth_bytes(gpu: &Gpu) -> u64 {
     gpu.device_bytes().get("depth").copied().unwrap_or(0)
 }
 
-/// Pixels that differ in any channel.
+/// Returns the number of pixels that differ in any channel.
 fn differing(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {
     a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count()
 }
 
 #[test]
-fn without_a_depth_buffer_no_pixel_differs_on_any_named_path() {
+fn images_without_a_depth_buffer_are_equal_on_all_paths() {
     on_device(|gpu| {
         let mut field = synth::synth(synth::Kind::Fractal, [201, 170], 3);
         field.spacing = [20.0, 20.0];
@@ -92,9 +92,9 @@ fn without_a_depth_buffer_no_pixel_differs_on_any_named_path() {
     });
 }
 
-/// Who asks for the depths gets those of a depth buffer, and nobody else pays for one.
+/// A caller that requests depths gets those of a depth buffer; otherwise none is allocated.
 #[test]
-fn depths_are_there_for_who_asks() {
+fn depth_buffers_exist_only_on_request() {
     on_device(|gpu| {
         let field = mountains();
         let view = aslant(&field, SIZE, 1.0);
@@ -112,9 +112,9 @@ fn depths_are_there_for_who_asks() {
     });
 }
 
-/// The plan leaves the depth buffer out, and a frame whose draws are measured one by one has none either.
+/// A frame whose draws are measured one by one needs no depth buffer either.
 #[test]
-fn a_probed_frame_is_painted_too() {
+fn a_probed_frame_uses_no_depth_buffer() {
     on_device(|gpu| {
         let field = mountains();
         let view = aslant(&field, SIZE, 1.0);
@@ -127,13 +127,13 @@ fn a_probed_frame_is_painted_too() {
     });
 }
 
-/// Nearest first every pixel is drawn once; in no order some are drawn over, furthest first as often as land lies there.
+/// Front to back, every pixel is drawn once. In random order some are overdrawn, and back to front most.
 #[test]
-fn nearest_first_nothing_is_drawn_over() {
+fn front_to_back_order_has_no_overdraw() {
     on_device(|gpu| {
         let field = mountains();
         let mut view = aslant(&field, SIZE, 1.0);
-        // Low over the land, so that much of it is behind other land.
+        // Low over the terrain, so that much of it is hidden by other terrain.
         view.eye = field.world_at(3.3, 92.6, f64::from(field.height(3, 92))) + glam::DVec3::Y * 150.0;
         view.world_from_eye = View::turned(-35.0, -3.0, 0.0);
         let passed = ["front", "shuffled", "back", "painter"].map(|order| {
@@ -143,7 +143,7 @@ fn nearest_first_nothing_is_drawn_over() {
             let covered = renderer.picture().pixels().filter(|p| p.0[3] > 0).count() as u64;
             times.gpu.passed.map(|passed| (passed, covered))
         });
-        println!("fragments past the depth test, and pixels of land: {passed:?}");
+        println!("fragments past the depth test, and pixels of terrain: {passed:?}");
         let [Some((front, terrain)), Some((shuffled, _)), Some((back, _)), Some((painter, _))] = passed else {
             return println!("skipped: this device does not count fragments");
         };
@@ -152,9 +152,9 @@ fn nearest_first_nothing_is_drawn_over() {
     });
 }
 
-/// Indices are 16 bits wide where all of a frame's fit: those of rows of pages do, those of the whole frame do not.
+/// Indices are 16 bits wide if all of a frame's fit. Indices of rows of pages fit, those of a whole frame do not.
 #[test]
-fn narrow_indices_show_what_wide_ones_do() {
+fn narrow_and_wide_indices_give_the_same_image() {
     on_device(|gpu| {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
         let view = aslant(&field, SIZE, 1e-6);

@@ -1,4 +1,5 @@
-//! A frame in parts, each drawn by a submission of its own while the next is walked: the same picture to the bit.
+//! Tests of frames drawn in parts, each submitted while the next one is selected: the image must be the same to the
+//! bit.
 
 use cuesta::bench::paths;
 use cuesta::draw::DrawList;
@@ -13,7 +14,7 @@ use super::{mountains, on_device, technique};
 const SIZE: [u32; 2] = [96, 64];
 
 #[test]
-fn parts_show_what_the_whole_shows() {
+fn a_frame_in_parts_gives_the_same_image() {
     on_device(|gpu| {
         let field = mountains();
         let tolerance = Tolerance { px: 0.5, metric: Metric::Certified };
@@ -33,16 +34,16 @@ fn parts_show_what_the_whole_shows() {
                 assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]), "{order}");
                 terrain += pictures[0].0.pixels().filter(|p| p.0[3] > 0).count();
             }
-            assert!(terrain > 3000, "{order}: {terrain} pixels of land");
-            // Few rows of pages are in sight now and then: then there are fewer parts.
+            assert!(terrain > 3000, "{order}: {terrain} pixels of terrain");
+            // Views with few rows of pages have fewer parts.
             assert!(passes[0] == 6 && passes[1] > 9 && passes[2] > 15, "{order}: {passes:?}");
         }
     });
 }
 
-/// What is ready stays, and all of it is what comes at once otherwise.
+/// Finished parts do not change, and together they equal the list selected at once.
 #[test]
-fn what_is_ready_is_the_beginning_of_the_whole() {
+fn finished_parts_are_a_prefix_of_the_whole_list() {
     let field = mountains();
     let tolerance = Tolerance { px: 0.5, metric: Metric::Certified };
     for (order, serial) in [("order=front", ""), ("order=painter", ""), ("order=front", ":serial")] {

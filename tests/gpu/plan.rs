@@ -1,4 +1,5 @@
-//! Features that a scene does not need are omitted, and forcing one changes no picture.
+//! Tests of scene plans: features that a scene does not need are left out, and forcing them in does not change the
+//! image.
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ fn without_holes() -> Arc<Field> {
 }
 
 #[test]
-fn forced_features_show_the_same_picture() {
+fn forced_features_give_the_same_image() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
@@ -27,7 +28,7 @@ fn forced_features_show_the_same_picture() {
         let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
-        // All weights are 0.
+        // Without morph weights.
         same(
             "morphing",
             plan.with_requirements(PipelineRequirements {
@@ -52,8 +53,8 @@ fn forced_features_show_the_same_picture() {
     });
 }
 
-/// For every technique and every feature that its scene omits: kept by hand, the feature takes the memory in the plan,
-/// and the picture does not change.
+/// For every technique and every omitted feature: forcing it in costs what the plan states, and does not change the
+/// image.
 #[test]
 fn every_omitted_feature_saves_something_and_changes_no_picture() {
     on_device(|gpu| {
@@ -102,7 +103,7 @@ fn every_omitted_feature_saves_something_and_changes_no_picture() {
                 kept_in_some.insert(saving.feature);
             }
         }
-        // Scenes with queries are needed to measure; every other feature is omitted in some scene above.
+        // Scenes without queries measure nothing; all other features are omitted in some scene above.
         let forcible = FEATURES.iter().filter(|f| f.can_be(true) && f.name != "queries").map(|f| f.name);
         assert!(forcible.clone().all(|name| kept_in_some.contains(name)), "{kept_in_some:?}");
         assert_eq!(kept_in_some.len(), forcible.count());
@@ -127,7 +128,7 @@ fn features_omitted_by_hand_are_off() {
 }
 
 #[test]
-fn fog_and_colours_are_seen() {
+fn looks_differ_visibly() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [96, 64], 1.0);
@@ -156,7 +157,7 @@ fn fog_and_colours_are_seen() {
 }
 
 #[test]
-fn a_field_beyond_one_image_is_paged_and_one_beyond_all_is_refused_by_name() {
+fn large_fields_are_paged_and_too_large_ones_name_the_limit() {
     let field = mountains();
     let device = DeviceLimits { image_side: 64, image_layers: 6, filters_heights: true };
     let plan = ScenePlan::builder(&field, &Look::default(), &device).build().unwrap();

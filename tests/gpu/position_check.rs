@@ -1,4 +1,4 @@
-//! `position.glsl` and its CPU reference agree to the bit.
+//! Tests that `position.glsl` and its CPU reference agree to the bit.
 
 use std::sync::Arc;
 
@@ -16,14 +16,14 @@ use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with its own weights or random ones.
-fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
+/// Returns all vertices of every third instance that a technique draws, with its weights or random ones.
+fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], are_weights_random: bool) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
     let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        // Any bytes are valid weights; quadrants of level 0 cannot be finer.
+        // Any bytes are valid weights; level 0 has no finer quadrants.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
         let inside = random(0) & finer;
@@ -37,17 +37,17 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
             normals: VertexNormals::default(),
-            instance: if is_made_up { morphing } else { *instance },
+            instance: if are_weights_random { morphing } else { *instance },
             explicit_height: 0,
         })
     });
     queries.collect()
 }
 
-/// Lattice vertices of two techniques, and explicit vertices with weights of their own.
+/// Returns lattice vertices of several techniques, and explicit vertices with their own weights.
 fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
-    let forms: &[(&str, &[&str])] = match morph {
-        // Half samples occur only with weights.
+    let configs: &[(&str, &[&str])] = match morph {
+        // Without weights the shader has no half samples.
         Morph::No => &[("geomipmap", &["block=17"])],
         Morph::ByInstance => &[
             ("geomipmap", &["block=17"]),
@@ -58,9 +58,9 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             &[("clusters", &["block=8", "morph=distance"]), ("clusters:draw-per-block", &["block=8", "morph=distance"])]
         }
     };
-    let is_made_up = morph == Morph::ByInstance;
-    let of_form = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, is_made_up);
-    let mut queries: Vec<_> = forms.iter().flat_map(of_form).collect();
+    let are_weights_random = morph == Morph::ByInstance;
+    let of_config = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, are_weights_random);
+    let mut queries: Vec<_> = configs.iter().flat_map(of_config).collect();
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {
             position: [(k % 37) as i32, (k / 37) as i32],
@@ -68,10 +68,10 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             target: 1200.0 + 1.7 * k as f32,
             second_target: 1400.0 - 0.9 * k as f32,
             morph: k as f32 / 1999.0,
-            // Of neither, of the vertex, of both.
+            // No region, that of the vertex, those of vertex and target.
             regions: [0, 1 + k % 32, (1 + k % 32) | (1 + k * 7 % 32) << 8][k as usize % 3],
         },
-        // Steep and level ones too; y is what x and z leave.
+        // Steep and level normals; y follows from x and z.
         normals: VertexNormals {
             normal: k.wrapping_mul(0x9e37_79b1),
             target: k.wrapping_mul(0x85eb_ca6b),
@@ -134,7 +134,7 @@ fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32
 }
 
 #[test]
-fn vertices_lie_where_the_cpu_says_to_the_bit() {
+fn vertex_positions_equal_the_cpu_reference() {
     on_device(|gpu| {
         let coded = mountains();
         compare(gpu, "16-bit", &coded, 0);

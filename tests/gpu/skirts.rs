@@ -1,4 +1,4 @@
-//! Skirts on the screen: they hide every gap, they are counted, and how deep they hang does not show.
+//! Tests of skirts in images: they hide every gap, they are counted, and their depth is invisible.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use cuesta::view::View;
 use super::{aslant, difference, on_device, render, technique};
 use crate::conformance::cases;
 
-/// Clusters whose skirts hang down so many times as deep.
+/// Clusters with skirts `factor` times as deep.
 struct Deeper {
     inner: Box<dyn Technique>,
     factor: f32,
@@ -48,7 +48,7 @@ fn skirted(field: &Arc<Field>, morph: &str, factor: f32) -> Deeper {
     Deeper { inner: technique(field, "clusters", &["block=8", morph, "seams=skirts"]), factor }
 }
 
-/// Pixels of a view where the sky shines through.
+/// Returns the number of pixels where sky shows through terrain.
 fn hole_pixels(gpu: &Arc<Gpu>, field: &Arc<Field>, view: &View, picture: &image::RgbaImage) -> usize {
     let look = Look::default();
     let plan = ScenePlan::builder(field, &look, &gpu.device_limits()).build().unwrap();
@@ -61,11 +61,11 @@ fn count(picture: &image::RgbaImage) -> usize {
 }
 
 #[test]
-fn skirts_are_seen_where_levels_meet_and_hide_every_gap() {
+fn skirts_hide_every_gap_between_levels() {
     on_device(|gpu| {
         let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 290], 5));
         let outside = aslant(&field, [640, 480], 4.0);
-        // Within: at the end of the land its skirts would be seen from the side.
+        // Inside the field, because skirts at its edge are visible from outside.
         let eye = field.world_at(150.0, 200.0, f64::from(field.statistics().max) + 200.0);
         let within = View { eye, world_from_eye: View::turned(40.0, -25.0, 0.0), ..outside };
         for (view, is_within, morph) in [(outside, false), (within, true)]
@@ -81,7 +81,7 @@ fn skirts_are_seen_where_levels_meet_and_hide_every_gap() {
             assert!(open[0] == 0 && open[1] > 0 && open[2] == 0, "{morph}: {open:?} hole pixels");
             assert_eq!([count(&stitched.picture), count(&flat)], [0, 0]);
             assert!(count(&skirt_vertex) > 0, "{morph}");
-            // A gap is closed by the first few metres: what hangs below is hidden.
+            // The first few metres close a gap; the rest of a skirt is hidden.
             assert!(
                 !is_within || deeper == skirt_vertex,
                 "{morph}: {:?} differ",
@@ -92,7 +92,7 @@ fn skirts_are_seen_where_levels_meet_and_hide_every_gap() {
 }
 
 #[test]
-fn no_hole_pixels_on_any_field_of_the_invariants() {
+fn skirts_leave_no_hole_pixels_on_any_test_field() {
     on_device(|gpu| {
         let mut seen = 0;
         for (name, field) in cases::fields() {

@@ -1,7 +1,8 @@
-//! A soak: random flights, teleports and switches of technique, for as many seconds as `CUESTA_SOAK_S` says or for a
-//! short while. Nothing leaks on the device, no chunk is lost, no list exceeds its limits, no validation message comes;
-//! and without the validation layers, run alone (with `CUESTA_SOAK_S`), the process is as large in its last fifth as in its
-//! second.
+//! Soak test: random flights, teleports and technique switches for `CUESTA_SOAK_S` seconds, or 20 s.
+//!
+//! No device memory leaks, no chunk is lost, no list exceeds its limits and no validation message appears. With
+//! `CUESTA_SOAK_S` a second test runs in a process of its own without validation layers: the process must not grow
+//! from the second to the last fifth of its flights.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,13 +17,13 @@ use glam::DVec3;
 
 use super::{aslant, on_device, on_device_with, technique};
 
-/// Seconds if nobody says how many.
+/// Default duration, seconds.
 const SECONDS: u64 = 20;
 
-/// Frames with one technique.
+/// Frames per flight.
 const FRAMES: u32 = 60;
 
-/// What the process may grow by from the second fifth to the last: allocators keep pieces.
+/// Maximum growth of the process from the second fifth to the last; allocators retain some memory.
 const GROWTH_BYTES: u64 = 16 << 20;
 
 struct Random(u64);
@@ -38,7 +39,7 @@ impl Random {
     }
 }
 
-/// Every technique and variant as it is, and chunks that are short of time or of memory.
+/// Returns every technique and variant with defaults, and chunk settings short of time or memory.
 fn forms() -> Vec<(String, Vec<&'static str>)> {
     let of = |entry: &'static cuesta::lod::Entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{}", entry.name, variant.name));
@@ -49,7 +50,7 @@ fn forms() -> Vec<(String, Vec<&'static str>)> {
     plain.chain(short.map(|settings| ("smooth-tiles".to_string(), settings))).collect()
 }
 
-/// The next view: a step and a turn, the same once more, or somewhere else.
+/// Returns the next view: a step, a turn, the same view, or a teleport.
 fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
     let [w, h] = field.size().map(f64::from);
     let step = DVec3::new(random.number() - 0.5, random.number() - 0.5, random.number() - 0.5) * 60.0;
@@ -67,7 +68,7 @@ fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
     }
 }
 
-/// One flight with one technique; bytes on the device while it lasts.
+/// Runs one flight with one technique. Returns the device bytes during it.
 fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: &str, random: &mut Random) -> u64 {
     let look = Look::default();
     let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
@@ -91,14 +92,14 @@ fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: 
     made
 }
 
-/// What the process holds now, bytes.
+/// Returns the resident memory of the process, bytes.
 fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     line.trim().trim_end_matches(" kB").parse::<u64>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-/// Random flights for so long; what the process held after each, bytes.
+/// Runs random flights for a duration. Returns the resident memory after each, bytes.
 fn soak(gpu: &Arc<Gpu>, lasts: Duration) -> Vec<u64> {
     let field = Arc::new(synth::synth(synth::Kind::Fractal, [385, 321], 3));
     let (random, forms) = (&mut Random(0x50a4), forms());
@@ -106,11 +107,11 @@ fn soak(gpu: &Arc<Gpu>, lasts: Duration) -> Vec<u64> {
     let (started, empty) = (Instant::now(), bytes());
     let mut held = Vec::new();
     while started.elapsed() < lasts || held.len() < forms.len() {
-        // Each once, then any.
+        // Each configuration once, then random ones.
         let (name, settings) =
             forms.get(held.len()).unwrap_or_else(|| &forms[(random.number() * forms.len() as f64) as usize]);
         let mut technique = technique(&field, name, settings);
-        assert!(fly(gpu, &field, technique.as_mut(), name, random) > empty, "{name}: it has something to leak");
+        assert!(fly(gpu, &field, technique.as_mut(), name, random) > empty, "{name}: a flight allocates device memory");
         drop(technique);
         assert_eq!(bytes(), empty, "{name} {settings:?}: bytes left on the device");
         let messages = gpu.instance.messages.lock().unwrap().join("\n");
@@ -120,39 +121,39 @@ fn soak(gpu: &Arc<Gpu>, lasts: Duration) -> Vec<u64> {
     held
 }
 
-/// Seconds that somebody asked for.
+/// Returns the duration in `CUESTA_SOAK_S`, seconds.
 fn asked() -> Option<u64> {
     std::env::var("CUESTA_SOAK_S").ok().map(|s| s.parse().expect("CUESTA_SOAK_S: seconds"))
 }
 
 #[test]
-fn nothing_leaks_on_the_device_however_long_it_flies() {
+fn random_flights_leak_no_device_memory() {
     let lasts = Duration::from_secs(asked().unwrap_or(SECONDS));
     on_device(|gpu| println!("{} flights", soak(gpu, lasts).len()));
 }
 
-/// What makes glibc's allocator give large pieces back at once: without it a process keeps what many sizes of pieces left
-/// between them, for hundreds of flights, and nobody can tell that from a leak. Other allocators don't know these names.
+/// Settings that make glibc's allocator return large blocks at once. Without them fragmentation over hundreds of
+/// flights is indistinguishable from a leak. Other allocators ignore them.
 const GIVE_BACK: [(&str, &str); 3] =
     [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072"), ("MALLOC_ARENA_MAX", "1")];
 
-/// This test alone, in a process whose allocator gives back.
+/// Runs `the_process_does_not_grow` in a process with [`GIVE_BACK`].
 fn alone() -> std::process::ExitStatus {
     let test = "gpu::soak::the_process_does_not_grow";
     let mut process = std::process::Command::new(std::env::current_exe().unwrap());
     process.args([test, "--exact", "--nocapture"]).envs(GIVE_BACK).status().unwrap()
 }
 
-/// Without the layers, which remember something of every object there ever was: some 0.1 MiB a flight.
+/// Runs without validation layers, which retain about 0.1 MiB per flight.
 #[test]
 fn the_process_does_not_grow() {
-    let Some(seconds) = asked() else { return println!("skipped: the process is looked at with CUESTA_SOAK_S, alone") };
+    let Some(seconds) = asked() else { return println!("skipped: runs only with CUESTA_SOAK_S") };
     if GIVE_BACK.iter().any(|(name, _)| std::env::var_os(name).is_none()) {
         return assert!(alone().success());
     }
     on_device_with(false, |gpu| {
         let held = soak(gpu, Duration::from_secs(seconds));
-        // Medians: for a moment it may hold more.
+        // Medians ignore momentary peaks.
         let median = |flights: &[u64]| {
             let mut sorted = flights.to_vec();
             sorted.sort_unstable();

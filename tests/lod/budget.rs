@@ -23,7 +23,7 @@ fn settles_within_fifteen_frames_without_noise() {
     for (slope, delay) in [0.3, 0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
         for (name, event, first_px, factor) in events() {
             let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.0, seed: 0 };
-            let frames = &load.fly(Target::Triangles(COST), first_px, 160)[event..];
+            let frames = &load.run(Target::Triangles(COST), first_px, 160)[event..];
             let (overshoot, settling) =
                 (overshoot(&frames[if event > 0 { delay } else { 0 }..]), settling(frames, 0.05));
             assert!(overshoot <= 0.2 && settling <= 15, "slope {slope}, delay {delay}, {name}: {overshoot} {settling}");
@@ -45,7 +45,7 @@ fn holds_the_expected_cost_with_noise() {
         for (name, event, first_px, factor) in events() {
             let of_seed = |seed: u64| {
                 let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.3, seed };
-                let frames = &load.fly(Target::FrameMs(COST), first_px, 120)[event..];
+                let frames = &load.run(Target::FrameMs(COST), first_px, 120)[event..];
                 // Frames drawn before the change could be known do not count as overshoot.
                 let known = if event > 0 { delay + 1 } else { 0 };
                 (overshoot(&frames[known..]), settling(frames, 0.2) as f64)
@@ -66,7 +66,7 @@ fn noise_causes_no_limit_cycle() {
     for delay in [1, 2, 3] {
         let of_seed = |seed: u64| {
             let load = Load { curve: &power(1.0), factor: &constant, delay, noise: 0.3, seed };
-            let frames = load.fly(Target::FrameMs(COST), 1.0, 400);
+            let frames = load.run(Target::FrameMs(COST), 1.0, 400);
             let moves = frames.windows(2).filter(|pair| pair[0].px != pair[1].px).count();
             let rms = (frames.iter().map(|frame| (frame.cost - 1.0).powi(2)).sum::<f64>() / 400.0).sqrt();
             (moves as f64 / 400.0, rms)
@@ -86,7 +86,7 @@ fn holds_slopes_up_to_ten_thousand() {
         for factor in [1.5, 3.0, 1.0 / 1.5, 1.0 / 3.0] {
             let load = Load { curve: &power(slope), factor: &step(factor), delay, noise: 0.0, seed: 0 };
             let first_px = (-0.5 / slope).exp();
-            let frames = load.fly(Target::Triangles(COST), first_px, 160);
+            let frames = load.run(Target::Triangles(COST), first_px, 160);
             let after = &frames[EVENT..];
             let (found, overshoot, settling) =
                 (settling(&frames[..EVENT], 0.05), overshoot(&after[delay..]), settling(after, 0.05));
@@ -108,7 +108,7 @@ fn settles_on_the_cheap_side_of_steps() {
     for (delay, noise, first_px) in [1, 2, 3].into_iter().flat_map(|d| [(d, 0.0, 7.0), (d, 0.0, 0.3), (d, 0.3, 7.0)]) {
         let load = Load { curve: &stairs, factor: &constant, delay, noise, seed: 5 };
         let target = if noise > 0.0 { Target::FrameMs(COST) } else { Target::Triangles(COST) };
-        let frames = load.fly(target, first_px, 400);
+        let frames = load.run(target, first_px, 400);
         let settled = frames.iter().rposition(|frame| frame.cost > 1.0).unwrap_or(0);
         let expensive = frames.iter().filter(|frame| frame.cost > 1.0).count();
         let last = frames[399];
@@ -126,7 +126,7 @@ fn single_slow_frame_is_ignored() {
     for (delay, spike) in [1, 2, 3].into_iter().flat_map(|d| [(d, 5.0), (d, 0.2)]) {
         let factor = |k: usize| if k == EVENT { spike } else { 1.0 };
         let load = Load { curve: &power(1.5), factor: &factor, delay, noise: 0.0, seed: 0 };
-        let frames = load.fly(Target::Triangles(COST), 1.0, 100);
+        let frames = load.run(Target::Triangles(COST), 1.0, 100);
         assert!(frames.iter().all(|frame| frame.px == frames[EVENT].px), "delay {delay}, × {spike}");
     }
 }
@@ -137,7 +137,7 @@ fn no_windup_at_the_ends_of_the_range() {
     for (delay, factor) in [1, 2, 3].into_iter().flat_map(|d| [(d, 1e4), (d, 1e-4)]) {
         let load = |k: usize| if (EVENT..3 * EVENT).contains(&k) { factor } else { 1.0 };
         let load = Load { curve: &power(1.0), factor: &load, delay, noise: 0.0, seed: 0 };
-        let frames = load.fly(Target::Triangles(COST), 1.0, 300);
+        let frames = load.run(Target::Triangles(COST), 1.0, 300);
         let end = frames[3 * EVENT - 1].px;
         let expected = if factor > 1.0 { RANGE_PX[1] } else { RANGE_PX[0] };
         assert!((end / expected - 1.0).abs() < 1e-9, "delay {delay}, × {factor}: {end} px");
@@ -154,7 +154,7 @@ fn follows_slow_changes() {
         let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
         for (name, factor) in [("ramp", &ramp as &(dyn Fn(usize) -> f64 + Sync)), ("swing", &swing)] {
             let load = Load { curve: &power(1.0), factor, delay, noise: 0.0, seed: 0 };
-            let frames = load.fly(Target::Triangles(COST), 1.0, 240);
+            let frames = load.run(Target::Triangles(COST), 1.0, 240);
             let worst = frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max);
             println!("delay {delay}, {name}: {worst:.3}");
             // Change of the load until it is known: 2 % a frame, and 0.3 · 2π / 40 = 4.7 %.
@@ -171,7 +171,7 @@ fn recovers_from_slow_first_frames() {
     for delay in [1, 2, 3] {
         let factor = |k: usize| if k < 3 { 10.0 } else { 1.0 };
         let load = Load { curve: &curve, factor: &factor, delay, noise: 0.04, seed: 3 };
-        let frames = load.fly(Target::FrameMs(COST), 0.5, 120);
+        let frames = load.run(Target::FrameMs(COST), 0.5, 120);
         let settled = settling(&frames[3..], 0.1);
         println!("delay {delay}: settled in {settled} frames");
         assert!(settled <= 60, "delay {delay}: {settled}");

@@ -259,10 +259,7 @@ fn morphing_strips_do_not_jump() {
         for blend in ["blend=height", "blend=end"] {
             let [step, total] = of(blend);
             println!("{page} {blend}: jumps of {jump} m, blended {step} m a step and {total} m in all");
-            assert!(
-                jump > 1.0 && step < 0.05 * jump && total > 0.1 * jump,
-                "{page} {blend}: {jump} {step} {total}"
-            );
+            assert!(jump > 1.0 && step < 0.05 * jump && total > 0.1 * jump, "{page} {blend}: {jump} {step} {total}");
         }
     }
 }

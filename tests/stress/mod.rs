@@ -1,22 +1,22 @@
-//! The suite finds what is broken, says where, and keeps what shows it.
+//! Tests of the stress suite: it finds broken techniques, reports where they fail and saves counter-examples.
 
 use std::sync::Arc;
 
 use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::height::{Field, Options, load};
 use cuesta::lod::{Entry, Settings, Technique, geomipmap};
-use cuesta::stress::jitter::{Jitter, LIMIT_PX, Way};
+use cuesta::stress::jitter::{Jitter, LIMIT_PX, VertexPlacement};
 use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
-use cuesta::stress::{Case, Finding, Form, Kind, Trial, cases, forms, saved};
+use cuesta::stress::{Case, CaseRun, Finding, Kind, TechniqueConfig, cases, forms, saved};
 use cuesta::view::View;
 
-/// GeoMipMapping without its last block.
-struct BlockLost(Box<dyn Technique>);
+/// A mutant of GeoMipMapping that does not draw its last block.
+struct DropsLastBlock(Box<dyn Technique>);
 
-/// A technique that panics in every view.
+/// A mutant that panics in every view.
 struct Panics(Geometry);
 
-impl Technique for BlockLost {
+impl Technique for DropsLastBlock {
     fn resident(&self) -> &Geometry {
         self.0.resident()
     }
@@ -52,38 +52,38 @@ impl Technique for Panics {
     }
 }
 
-fn block_lost(field: Arc<Field>, settings: &Settings) -> Box<dyn Technique> {
-    Box::new(BlockLost((geomipmap::ENTRY.build)(field, settings)))
+fn drops_last_block(field: Arc<Field>, settings: &Settings) -> Box<dyn Technique> {
+    Box::new(DropsLastBlock((geomipmap::ENTRY.build)(field, settings)))
 }
 
-static BLOCK_LOST: Entry = Entry { name: "block-lost", build: block_lost, ..geomipmap::ENTRY };
+static DROPS_LAST_BLOCK: Entry = Entry { name: "block-lost", build: drops_last_block, ..geomipmap::ENTRY };
 static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 
-fn form(entry: &'static Entry) -> Form {
-    let [form] = forms::plain(&["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
-    Form { entry, name: entry.name.to_string(), ..form }
+fn config(entry: &'static Entry) -> TechniqueConfig {
+    let [config] = forms::with_defaults(&["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
+    TechniqueConfig { entry, name: entry.name.to_string(), ..config }
 }
 
 fn case(name: &str) -> &'static Case {
     cases().find(|case| case.name == name).expect("a case of the suite")
 }
 
-fn failed(trial: &Trial) -> Vec<Finding> {
-    trial.run().into_iter().filter(|finding| !finding.passes()).collect()
+fn failed(run: &CaseRun) -> Vec<Finding> {
+    run.run().into_iter().filter(|finding| !finding.passes()).collect()
 }
 
 #[test]
-fn what_is_broken_is_found_in_terrains_and_flights_and_kept() {
+fn a_dropped_block_is_found_in_terrains_and_flights_and_saved() {
     for name in ["prime sides, 131 x 67", "back again in mid-morph"] {
-        let trial = Trial { case: case(name), form: Some(form(&BLOCK_LOST)) };
-        let failed = failed(&trial);
+        let run = CaseRun { case: case(name), config: Some(config(&DROPS_LAST_BLOCK)) };
+        let failed = failed(&run);
         let finding =
             failed.iter().find(|finding| finding.check.starts_with("one surface")).expect("a surface with a gap");
         let violation = finding.violation.as_ref().expect("the view that shows it");
         assert!(violation.why.contains("Gap"), "{violation}");
         let folder = tempfile::tempdir().unwrap();
-        let files = saved::counter_example(folder.path(), &trial, finding, None).unwrap();
+        let files = saved::counter_example(folder.path(), &run, finding, None).unwrap();
         let extensions: Vec<_> = files.iter().map(|file| file.extension().unwrap().to_str().unwrap()).collect();
         assert_eq!(extensions, ["tif", "txt", "ply"]);
         assert!(load(&files[0], &Options::default()).unwrap().field.size()[0] > 100);
@@ -95,29 +95,30 @@ fn what_is_broken_is_found_in_terrains_and_flights_and_kept() {
 
 #[test]
 fn a_panic_is_a_finding() {
-    let failed = failed(&Trial { case: case("flat"), form: Some(form(&PANICS)) });
+    let failed = failed(&CaseRun { case: case("flat"), config: Some(config(&PANICS)) });
     assert_eq!(failed.len(), 1);
     assert_eq!((failed[0].check, failed[0].why.as_deref()), ("panics", Some("out of cheese")));
 }
 
 #[test]
-fn no_number_never_passes() {
+fn nan_and_infinity_do_not_pass() {
     assert!(!Finding::within("a check", f64::NAN, 1.0).passes());
     assert!(!Finding::within("a check", f64::INFINITY, 1.0).passes());
     assert!(Finding::within("a check", 1.0, 1.0).passes() && Finding::reported("a check", f64::NAN).passes());
 }
 
-/// The product trembles 16 times less than it may, and what it is compared with far more.
+/// The renderer's own placement jitters at most 1/16 of the limit; world coordinates exceed it by far.
 #[test]
-fn only_world_coordinates_tremble_far_from_the_origin() {
+fn only_world_coordinates_jitter_far_from_the_origin() {
     let px = |way| Jitter::of(1e7, way).max_px();
-    let [world, relative, product] = [Way::World, Way::Relative, Way::Product].map(px);
-    println!("at 1e7 m: {world:.3} px, {relative:.5} px, {product:.5} px");
-    assert!(world > 16.0 * LIMIT_PX && relative < LIMIT_PX && product < LIMIT_PX / 16.0);
+    let [world, relative, own] =
+        [VertexPlacement::WorldF32, VertexPlacement::EyeRelative, VertexPlacement::SampleRelative].map(px);
+    println!("at 1e7 m: {world:.3} px, {relative:.5} px, {own:.5} px");
+    assert!(world > 16.0 * LIMIT_PX && relative < LIMIT_PX && own < LIMIT_PX / 16.0);
 }
 
 #[test]
-fn every_family_of_the_contract_is_there_and_every_name_once() {
+fn all_families_exist_and_case_names_are_unique() {
     let mut families: Vec<_> = cases().map(|case| case.family).collect();
     families.dedup();
     assert_eq!(families, ["data", "position", "view", "time", "arithmetic", "stiff", "file", "sweep"]);
@@ -128,17 +129,17 @@ fn every_family_of_the_contract_is_there_and_every_name_once() {
     assert_eq!(names.len(), count);
 }
 
-/// The cases without a technique, whole: the controller, the loaders, the vertex program.
+/// Runs all cases without a technique: controller, loaders and vertex placement.
 #[test]
-fn what_stands_alone_passes() {
-    for case in cases().filter(|case| matches!(case.kind, Kind::Alone(..))) {
-        let failed = failed(&Trial { case, form: None });
+fn standalone_cases_pass() {
+    for case in cases().filter(|case| matches!(case.kind, Kind::Standalone(..))) {
+        let failed = failed(&CaseRun { case, config: None });
         assert!(failed.is_empty(), "{}: {failed:?}", case.name);
     }
 }
 
 #[test]
-fn a_suite_is_read_again_as_it_was_written_and_drawn_as_a_page() {
+fn results_survive_a_round_trip_and_become_a_page() {
     let row = |check: &str, value: Option<f64>, limit: Option<f64>, pass: bool| Row {
         family: "data".to_string(),
         name: "flat <b>".to_string(),

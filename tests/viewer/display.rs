@@ -1,21 +1,21 @@
-//! A display of its own for a test, and the hands that press its keys and move its mouse.
+//! A virtual X display for tests, with key and mouse events sent by `xdotool`.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A virtual X server; gone when dropped.
+/// A virtual X server, stopped when dropped.
 pub struct Display {
     server: Child,
     name: String,
 }
 
 impl Display {
-    /// Starts one on a free number, or says what is missing.
+    /// Starts a server on a free display number. Fails with the missing program.
     ///
-    /// A server resets when its last client leaves, and drops whoever connects meanwhile: `-noreset`, as every
-    /// question to `xdotool` is a client that leaves.
+    /// A server resets when its last client disconnects, and drops clients that connect meanwhile. Each `xdotool`
+    /// call is such a client, hence `-noreset`.
     pub fn start() -> Result<Self, String> {
         let started = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset"])
@@ -24,9 +24,9 @@ impl Display {
             .spawn();
         let mut server = started.map_err(|e| format!("Xvfb: {e}"))?;
         let mut line = String::new();
-        let told = server.stdout.take().map(|out| BufReader::new(out).read_line(&mut line));
+        let read = server.stdout.take().map(|out| BufReader::new(out).read_line(&mut line));
         let display = Self { server, name: format!(":{}", line.trim()) };
-        match told {
+        match read {
             Some(Ok(bytes)) if bytes > 1 => {}
             _ => return Err("Xvfb did not start".to_string()),
         }
@@ -34,25 +34,25 @@ impl Display {
         Ok(display)
     }
 
-    /// Makes a command run on it.
+    /// Makes a command run on this display.
     pub fn on<'a>(&self, command: &'a mut Command) -> &'a mut Command {
         command.env("DISPLAY", &self.name).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET")
     }
 
-    /// Real key and mouse events: what `xdotool` understands, in words.
-    pub fn act(&self, words: &str) -> String {
+    /// Sends real key and mouse events: runs `xdotool` with the given words and returns its output.
+    pub fn xdotool(&self, words: &str) -> String {
         let output = self.on(Command::new("xdotool").args(words.split_whitespace())).output().expect("xdotool runs");
         assert!(output.status.success(), "xdotool {words}: {}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8_lossy(&output.stdout).trim().to_string()
     }
 
-    /// The number of the window whose title contains this, opened by a program that still runs.
+    /// Returns the id of the window whose title contains `title`, opened by a running program.
     pub fn window(&self, title: &str, program: &mut Child) -> String {
         eventually("a window", || {
             if program.try_wait().expect("a child").is_some() {
-                let mut told = String::new();
-                program.stderr.take().map(|mut err| err.read_to_string(&mut told));
-                panic!("the program ended before it had a window: {told}");
+                let mut output = String::new();
+                program.stderr.take().map(|mut err| err.read_to_string(&mut output));
+                panic!("the program ended before it had a window: {output}");
             }
             let found = self.on(Command::new("xdotool").args(["search", "--onlyvisible", "--name", title])).output();
             let text = String::from_utf8(found.expect("xdotool runs").stdout).expect("digits");
@@ -68,22 +68,22 @@ impl Drop for Display {
     }
 }
 
-/// Waits until there is something.
+/// Polls until there is a result.
 ///
 /// # Panics
-/// If there is nothing after three minutes: the software device is slow, but not that slow.
-pub fn eventually<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+/// After three minutes, which is ample for a software device.
+pub fn eventually<T>(what: &str, mut poll: impl FnMut() -> Option<T>) -> T {
     let started = Instant::now();
     loop {
-        if let Some(found) = look() {
+        if let Some(found) = poll() {
             return found;
         }
-        assert!(started.elapsed() < Duration::from_secs(180), "waited in vain for {what}");
+        assert!(started.elapsed() < Duration::from_secs(180), "timed out waiting for {what}");
         std::thread::sleep(Duration::from_millis(30));
     }
 }
 
-/// A picture that a program writes, once it is there.
+/// Waits for an image file that a program writes, and loads it.
 pub fn picture(path: &Path) -> image::RgbImage {
     let what = path.display().to_string();
     eventually(&what, || path.exists().then_some(()));

@@ -1,4 +1,4 @@
-//! A case of the sweep as plain data, and its check against every invariant.
+//! A sweep case as plain data, and its check against every invariant.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,7 +24,7 @@ pub struct SweepCase {
     /// Variant, unless it is the default one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<String>,
-    /// Keys and values that are not the defaults.
+    /// Keys and values that differ from the defaults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub settings: Vec<(String, String)>,
     /// The terrain.
@@ -33,18 +33,18 @@ pub struct SweepCase {
     pub view: Viewpoint,
     /// Tolerance, pixels.
     pub tolerance_px: f64,
-    /// True if the tolerance is the paper's and not the certified one.
+    /// True for the paper's error metric, false for the certified one.
     #[serde(default)]
     pub paper_metric: bool,
 }
 
 impl SweepCase {
-    /// The technique's row.
+    /// Returns the technique's table entry.
     pub fn entry(&self) -> Result<&'static Entry, String> {
         lod::find(&self.technique).ok_or_else(|| format!("{}: no such technique", self.technique))
     }
 
-    /// The terrain and the view.
+    /// Creates the terrain and the view.
     pub fn scene(&self) -> (Arc<Field>, View) {
         let field = Arc::new(self.terrain.field());
         let metric = if self.paper_metric { Metric::Paper } else { Metric::Certified };
@@ -52,7 +52,7 @@ impl SweepCase {
         (field, view)
     }
 
-    /// Holds the case against every invariant. Returns the first that fails; a panic is a failure.
+    /// Checks every invariant. Returns the first failure; a panic is a failure.
     pub fn check(&self) -> Result<(), Box<Failure>> {
         match self.entry() {
             Ok(entry) => self.check_with(entry),
@@ -60,7 +60,7 @@ impl SweepCase {
         }
     }
 
-    /// The same with another row in place of the technique's.
+    /// Checks with another table entry in place of the technique's.
     pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];

@@ -1,8 +1,9 @@
-//! The random sweep: every technique on random terrain, in random settings and views, held against every invariant.
+//! The random sweep: every technique on random terrain, with random settings and views, checked against every
+//! invariant.
 //!
-//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`INVARIANTS`](super::laws::LAWS) ([`case`]). One that
-//! fails is made smaller as long as it fails in the same way ([`shrink`]), and is printed as one line of JSON that runs
-//! again anywhere.
+//! A case is plain data, derived from a seed and a number ([`random`]). [`case`] checks it against
+//! [`INVARIANTS`](super::invariants::INVARIANTS). [`shrink`] reduces a failing case while it fails in the same way;
+//! it is printed as one line of JSON that reproduces the failure anywhere.
 
 pub mod case;
 pub mod random;
@@ -13,28 +14,28 @@ pub mod viewpoint;
 use rayon::prelude::*;
 
 pub use self::case::SweepCase;
-use super::forms::Form;
+use super::forms::TechniqueConfig;
 use super::invariants::Violation;
 use super::{Case, Finding, Kind};
 
 /// The family `sweep`.
-pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::Each(of_form) }];
+pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::PerTechnique(of_config) }];
 
-/// Cases of each form that the stress suite runs, and their seed.
+/// Cases per configuration in the stress suite, and their seed.
 const SUITE_CASES: u64 = 200;
 const SUITE_SEED: u64 = 19;
 
-/// Failures that are made smaller, at most: each takes as long as hundreds of cases.
+/// Maximum number of failures that are shrunk; each takes as long as hundreds of cases.
 const MAX_SHRUNK: usize = 4;
 
-/// A case that does not keep an invariant.
+/// A case that violates an invariant.
 #[derive(Clone, Debug)]
 pub struct Failure {
     /// The case.
     pub case: SweepCase,
-    /// The invariant.
+    /// Name of the invariant.
     pub invariant: &'static str,
-    /// The view and the reason.
+    /// The violation.
     pub violation: Violation,
 }
 
@@ -44,7 +45,7 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Runs cases on all cores. Returns the failures in order, the first few of them shrunk.
+/// Checks cases on all cores. Returns the failures in order, the first few of them shrunk.
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
     let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).map(|failure| *failure).collect();
     let few = failures.len().min(MAX_SHRUNK);
@@ -52,14 +53,14 @@ pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
     failures
 }
 
-/// Random cases of one technique and variant.
-fn of_form(form: &Form) -> Vec<Finding> {
-    let case = |number| random::case(SUITE_SEED, number, form.entry, Some(form.variant));
+/// Checks random cases of one technique and variant.
+fn of_config(config: &TechniqueConfig) -> Vec<Finding> {
+    let case = |number| random::case(SUITE_SEED, number, config.entry, Some(config.variant));
     let failures = run((0..SUITE_CASES).into_par_iter().map(case));
     let first = failures.first();
     let count = Finding::within("cases that fail", failures.len() as f64, 0.0);
     vec![
         Finding { violation: first.map(|failure| failure.violation.clone()), ..count }
-            .because(first.map(Failure::to_string)),
+            .with_reason(first.map(Failure::to_string)),
     ]
 }

@@ -1,21 +1,21 @@
-//! From a case that fails to a simpler one that fails in the same way.
+//! Shrinks a failing sweep case to a simpler one that fails in the same way.
 
 use super::Failure;
 use super::case::SweepCase;
 use super::terrain::Voids;
 use super::viewpoint::{CaseLens, Direction, Viewpoint};
 
-/// Cases tried, at most.
+/// Maximum number of cases tried.
 const MAX_TRIES: usize = 400;
 
-/// The simplest failure of the same invariant that is found by changing one thing at a time.
+/// Returns the simplest failure of the same invariant found by changing one property at a time.
 pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Box<Failure>>) -> Failure {
     let mut tries = 0;
     loop {
-        let fails = |case: SweepCase| check(&case).err().filter(|other| other.invariant == failure.invariant);
+        let same_failure = |case: SweepCase| check(&case).err().filter(|other| other.invariant == failure.invariant);
         let smaller = candidates(&failure.case).into_iter().take(MAX_TRIES - tries).find_map(|case| {
             tries += 1;
-            fails(case)
+            same_failure(case)
         });
         match smaller {
             Some(smaller) => failure = *smaller,
@@ -24,7 +24,7 @@ pub fn shrink(mut failure: Failure, check: impl Fn(&SweepCase) -> Result<(), Box
     }
 }
 
-/// The case with one thing simpler, the largest steps first.
+/// Returns simplified copies of a case, each with one property changed, largest changes first.
 fn candidates(case: &SweepCase) -> Vec<SweepCase> {
     let mut simpler = Vec::new();
     let mut with = |change: &dyn Fn(&mut SweepCase)| {
@@ -42,7 +42,7 @@ fn candidates(case: &SweepCase) -> Vec<SweepCase> {
     with(&|case| case.terrain.origin = [0.0, 0.0]);
     with(&|case| case.terrain.spacing = [10.0, 10.0]);
     with(&|case| case.terrain.seed = 0);
-    // In this order: flat is simpler than ramp.
+    // Ordered from the simplest.
     let kinds = ["flat", "ramp", "cliff"];
     let rank = kinds.iter().position(|kind| *kind == case.terrain.kind).unwrap_or(kinds.len());
     kinds[..rank].iter().for_each(|kind| with(&|case| case.terrain.kind = kind.to_string()));
@@ -64,7 +64,7 @@ fn candidates(case: &SweepCase) -> Vec<SweepCase> {
     simpler
 }
 
-/// Straight down on all of the terrain.
+/// A view straight down on all of the terrain.
 fn overview() -> Viewpoint {
     Viewpoint {
         at: [0.5, 0.5],

@@ -1,28 +1,28 @@
-//! Synthetic terrain of a case: kind, size, spacing, holes, tiles and origin.
+//! Synthetic terrain of a sweep case: kind, size, spacing, holes, tiles and origin.
 
 use serde::{Deserialize, Serialize};
 
 use crate::height::synth::{self, noise};
 use crate::height::{Field, Holes, Samples};
 
-/// Where samples have no data.
+/// Distribution of samples without data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Voids {
-    /// Nowhere.
+    /// No voids.
     #[default]
     None,
-    /// In a lake around the middle.
+    /// A disc around the middle.
     Lake,
-    /// At one sample in twenty.
+    /// About one sample in twenty, at random.
     Scattered,
-    /// East of a line.
+    /// Everything east of a slanted line.
     East,
-    /// Everywhere but at a few samples.
+    /// Everything but a small disc.
     Most,
 }
 
 impl Voids {
-    /// Every kind.
+    /// All distributions.
     pub const ALL: [Self; 5] = [Self::None, Self::Lake, Self::Scattered, Self::East, Self::Most];
 
     fn has(self, at: [u32; 2], size: [u32; 2], seed: u64) -> bool {
@@ -55,7 +55,7 @@ pub struct Terrain {
     /// Repetitions along (x, z).
     #[serde(default = "once")]
     pub tiles: [u32; 2],
-    /// Place of the first sample, metres.
+    /// Position of the first sample along (x, z), metres.
     #[serde(default)]
     pub origin: [f64; 2],
 }
@@ -65,15 +65,15 @@ fn once() -> [u32; 2] {
 }
 
 impl Terrain {
-    /// The field.
+    /// Creates the field.
     ///
     /// # Panics
     /// If there is no such kind.
     pub fn field(&self) -> Field {
         let kind = self.kind.parse().expect("a kind of synthetic field");
-        let made = synth::synth(kind, self.size, self.seed);
+        let generated = synth::synth(kind, self.size, self.seed);
         let [w, h] = self.size;
-        let heights = (0..(w * h) as usize).map(|k| made.samples().height(k)).collect();
+        let heights = (0..(w * h) as usize).map(|k| generated.samples().height(k)).collect();
         let mut holes = Holes::none((w * h) as usize);
         let is_void = |k: &u32| self.voids.has([k % w, k / w], self.size, self.seed);
         (0..w * h).filter(is_void).for_each(|k| holes.insert(k as usize));
@@ -82,7 +82,7 @@ impl Terrain {
         if self.tiles == once() { field } else { field.tiled(self.tiles) }
     }
 
-    /// Samples of the field, repetitions included.
+    /// Returns the number of samples, repetitions included.
     pub fn samples(&self) -> u64 {
         [0, 1].into_iter().map(|k| u64::from(self.size[k]) * u64::from(self.tiles[k])).product()
     }

@@ -1,4 +1,4 @@
-//! The view of a case, in parts of the terrain, so that it keeps its meaning on terrain of another size.
+//! The view of a sweep case, relative to the terrain, so that it keeps its meaning on terrain of another size.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -9,27 +9,27 @@ use crate::view::{Lens, Tolerance, View};
 /// Projection of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum CaseLens {
-    /// Horizontal field of view, degrees.
+    /// Perspective with a horizontal field of view, degrees.
     Degrees(f64),
-    /// Width of a picture of parallel rays, in diagonals of the terrain.
+    /// Orthographic with an image width in diagonals of the terrain.
     Parallel(f64),
 }
 
-/// Direction of a case.
+/// View direction of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Direction {
     /// Yaw and pitch, degrees.
     Turned([f64; 2]),
-    /// Towards a place of the terrain, in parts of its sides.
+    /// Towards a point of the terrain, as fractions of its sides.
     Towards([f64; 2]),
 }
 
-/// Where the eye is and where it looks.
+/// Position and direction of the eye.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Viewpoint {
-    /// Place of the eye along (x, z), in parts of the terrain's sides: inside in 0..1.
+    /// Position of the eye along (x, z) as fractions of the terrain's sides; 0 to 1 is inside.
     pub at: [f64; 2],
-    /// Height of the eye over the nearest sample, in diagonals of the terrain.
+    /// Height of the eye above the nearest sample, in diagonals of the terrain.
     pub above: f64,
     /// Direction.
     pub direction: Direction,
@@ -38,14 +38,14 @@ pub struct Viewpoint {
     pub roll: f64,
     /// Projection.
     pub lens: CaseLens,
-    /// Pixels.
+    /// Image size, pixels.
     pub size: [u32; 2],
-    /// Near plane, in diagonals of the terrain.
+    /// Distance of the near plane, in diagonals of the terrain.
     pub near: f64,
 }
 
 impl Viewpoint {
-    /// The view of a field.
+    /// Returns the view of a field.
     pub fn view(&self, field: &Field, tolerance: Tolerance) -> View {
         let [w, h] = field.size().map(|n| f64::from(n - 1));
         let diagonal = (w * field.spacing[0]).hypot(h * field.spacing[1]);
@@ -56,8 +56,8 @@ impl Viewpoint {
         let eye = over(self.at, self.above * diagonal);
         let world_from_eye = match self.direction {
             Direction::Turned([yaw, pitch]) => View::turned(yaw, pitch, self.roll),
-            Direction::Towards(place) => {
-                let forward = over(place, 0.0) - eye;
+            Direction::Towards(position) => {
+                let forward = over(position, 0.0) - eye;
                 let forward = if forward.length() > 0.0 { forward } else { DVec3::NEG_Y };
                 View::looking_along(forward) * View::rolled(self.roll)
             }
