@@ -154,7 +154,7 @@ impl BenchBackend for DeviceBackend {
                 if let Some((from, resident, list)) = &before {
                     let old = pop::State { view: from, resident, list };
                     let new = pop::State { view, resident: technique.resident(), list: &renderer.list };
-                    pool.pop(&pop::pop(scene.field, old, new));
+                    pool.pop(pop::pop(scene.field, old, new));
                 }
             }
             // What the next frame is held against, if it is measured.
@@ -207,7 +207,7 @@ fn look(
     if renderer.list.pending > 0 {
         pool.pending(field, view, errors.screen_px.max, &depth);
     }
-    pool.economy(&economy::economy(field, view, resident, &renderer.list, &depth), fragments, covered);
+    pool.triangles(&economy::triangles(field, view, resident, &renderer.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
     pool.skirt_pixels(skirts(&picture).into_iter().filter(|&is| is).count());
     pool.picture(frame, &picture, &truth.picture)

@@ -2,19 +2,21 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::rows::Case;
 use super::run::FrameSample;
 use super::statistics::{Spread, middle};
 use crate::lod::budget::{Controller, RANGE_PX, Target};
+use crate::measure::extended;
 use crate::view::{Tolerance, View};
 
 /// A frame whose cost is within this share of the target holds it.
 const BAND: f64 = 0.05;
 
 /// What every frame is to cost, by moving the tolerance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
     /// Triangles.
@@ -78,13 +80,16 @@ impl ToleranceController {
 }
 
 /// How well a goal was held along a path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct BudgetStats {
     /// Share, 0 to 1, of the frames within 5 % of the goal.
+    #[schemars(range(max = 1.0))]
     pub within: f64,
     /// Frames before the first one within it.
     pub settling_frames: f64,
     /// Share, 0 to 1, of the frames from that one on that are within it; 0 if there is none.
+    #[schemars(range(max = 1.0))]
     pub settled: f64,
     /// Most that a frame from that one on cost, over the goal.
     pub max: f64,

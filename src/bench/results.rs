@@ -5,14 +5,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::goal::BudgetStats;
 use super::journal;
-use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, extended, kept};
+use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, unscaled};
 use super::statistics::{Estimate, middle};
 use crate::height::save::replace;
+use crate::measure::extended::{self, Extended};
 use crate::renamed;
 
 /// Name of the file with everything.
@@ -21,9 +23,10 @@ pub const RESULTS: &str = "results.json";
 pub const TABLE: &str = "results.csv";
 
 /// Everything a benchmark found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Results {
-    /// [`SCHEMA`].
+    /// Version of the format.
+    #[schemars(extend("const" = SCHEMA))]
     pub schema: u32,
     /// What all cases have in common.
     pub header: Header,
@@ -32,7 +35,7 @@ pub struct Results {
 }
 
 /// What one case took and what was wrong with it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseResult {
     /// What was drawn and how.
     pub case: Case,
@@ -45,7 +48,8 @@ pub struct CaseResult {
 }
 
 /// All rounds of a case. Each value is the median over the rounds of what a round says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct TimeSummary {
     /// Median frame time, milliseconds, with its bootstrap 95 % interval.
     pub frame_ms: Estimate,
@@ -83,7 +87,8 @@ pub struct TimeSummary {
     pub commands: f64,
     /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
     /// kept.
-    #[serde(with = "extended", default = "kept")]
+    #[serde(with = "extended", default = "unscaled")]
+    #[schemars(with = "Extended", extend("minimum" = 1))]
     pub tolerance_scale: f64,
     /// How well the goal was held, if there is one.
     #[serde(default)]

@@ -4,6 +4,7 @@
 
 pub mod beyond;
 pub mod economy;
+pub mod extended;
 pub mod geometric;
 pub mod hidden;
 pub mod histogram;

@@ -2,7 +2,7 @@
 
 use crate::bench::Errors;
 use crate::bench::results::{CaseResult, Results};
-use crate::bench::rows::Bin;
+use crate::measure::histogram::Bin;
 
 use super::axis::{Axis, Scale};
 use super::bars::{Bar, Bars};
@@ -136,13 +136,13 @@ impl SceneFigures {
             (
                 "pop",
                 histogram(&typical, names, "Popping", "displacement when the level of detail changes, px", |e| {
-                    e.pop.as_ref().map(|pop| pop.histogram.as_slice())
+                    e.pop.as_ref().map(|pop| pop.histogram.bins.as_slice())
                 }),
             ),
             (
                 "triangle-size",
                 histogram(&typical, names, "Size of triangles", "pixels per triangle", |e| {
-                    e.economy.as_ref().map(|economy| economy.pixels_per_triangle.as_slice())
+                    e.economy.as_ref().map(|economy| economy.pixels_per_triangle.bins.as_slice())
                 }),
             ),
             ("tolerance-time", tolerance_time(all.clone(), names)),

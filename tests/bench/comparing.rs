@@ -3,7 +3,8 @@
 
 use cuesta::bench::compare::{THRESHOLD, compare};
 use cuesta::bench::results::Results;
-use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary, TimeRow, Within};
+use cuesta::bench::rows::{ErrorRow, Errors, Row, TimeRow, Within};
+use cuesta::measure::summary::Summary;
 use cuesta::bench::run::{FrameSample, Timed};
 use cuesta::bench::{Case, Times};
 

@@ -57,7 +57,7 @@ fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     assert!(pop(&lists).max_px > 0.5 && pop(&lists) == pop(&finer));
     let depth = vec![0.0; 320 * 200];
     let [sizes, sizes_finer] =
-        [&lists, &finer].map(|lists| economy::economy(&field, &views[1], resident, &lists[1], &depth));
+        [&lists, &finer].map(|lists| economy::triangles(&field, &views[1], resident, &lists[1], &depth));
     assert_eq!(sizes, sizes_finer);
     let [proof, proof_finer] = [&lists, &finer].map(|lists| {
         let proof =

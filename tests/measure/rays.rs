@@ -129,11 +129,11 @@ fn turns_away(field: &Field, view: &View, i: u32, j: u32) -> bool {
     facing.contains(&true) && facing.contains(&false)
 }
 
-fn agree(what: &str, summary: Summary, values: impl Iterator<Item = f64>) {
+fn agree(what: &str, (count, summary): (u64, Summary), values: impl Iterator<Item = f64>) {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let n = values.len();
-    assert_eq!(summary.count, n as u64, "{what}: samples");
+    assert_eq!(count, n as u64, "{what}: samples");
     if n == 0 {
         return;
     }
@@ -161,12 +161,14 @@ fn compare(name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
         }
         let narrow = View { tolerance: Tolerance { px: view.tolerance.px / 4.0, ..view.tolerance }, ..view };
         let errors = geometric::errors(&field, &narrow, technique.resident(), &list);
-        agree("m", errors.vertical_m, rays.iter().map(|s| s.vertical_m));
-        agree("px", errors.screen_px, rays.iter().map(|s| s.screen_px));
-        agree("band, px", errors.silhouette_px, rays.iter().filter(|s| s.silhouette).map(|s| s.screen_px));
+        agree("m", (errors.samples, errors.vertical_m), rays.iter().map(|s| s.vertical_m));
+        agree("px", (errors.samples, errors.screen_px), rays.iter().map(|s| s.screen_px));
+        let in_band = rays.iter().filter(|s| s.silhouette);
+        agree("band, px", (errors.silhouette_samples, errors.silhouette_px), in_band.map(|s| s.screen_px));
         for bin in 0..ANGLES {
             let in_bin = rays.iter().filter(|s| (s.off_axis_degrees / 10.0) as usize == bin);
-            agree("of τ, by angle", errors.off_axis[bin], in_bin.map(|s| s.screen_px / narrow.tolerance.px));
+            let found = (errors.off_axis_samples[bin], errors.off_axis[bin]);
+            agree("of τ, by angle", found, in_bin.map(|s| s.screen_px / narrow.tolerance.px));
         }
         let kept = rays.iter().filter(|s| s.screen_px <= narrow.tolerance.px).count() as f64 / rays.len() as f64;
         assert!((errors.bound_kept - kept).abs() < 1e-12, "kept {} against {kept}", errors.bound_kept);

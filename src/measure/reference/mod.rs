@@ -16,17 +16,32 @@
 mod rtin;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::facing_up;
+use super::{extended, facing_up};
 use crate::height::surface::{self, Corner, Triangle};
 use crate::height::{Field, Holes, Samples};
 
 /// Most cells along a side of a greedy mesh.
 pub const TILE: u32 = 1024;
 
+/// Near-optimal meshes of a whole field within a vertical error, and a technique against them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
+pub struct Reference {
+    /// Largest vertical error of both meshes, metres.
+    pub error_m: f64,
+    /// Triangles of the greedy Delaunay mesh.
+    pub delaunay: Option<u64>,
+    /// Triangles of the right-triangulated irregular network.
+    pub rtin: Option<u64>,
+    /// The technique's triangles over the greedy mesh's, both over the terrain in view.
+    pub multiple: Option<f64>,
+}
+
 /// A mesh within an error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mesh {
     /// Triangles.
     pub triangles: u64,

@@ -29,7 +29,6 @@ mod sweep;
 use std::io::{self, Write};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
@@ -39,7 +38,7 @@ use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::view::{Frustum, View};
 
 /// What is wrong with a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// A corner lies outside the field.
     Outside,
@@ -58,7 +57,7 @@ pub enum Kind {
 }
 
 /// The fewest triangles that show what is wrong.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CounterExample {
     /// What is wrong.
     pub kind: Kind,
@@ -80,7 +79,7 @@ impl std::fmt::Display for CounterExample {
 impl std::error::Error for CounterExample {}
 
 /// What was proven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proof {
     /// Triangles.
     pub triangles: usize,
