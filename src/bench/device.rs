@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 
-use super::goal::ToleranceController;
+use super::controller::ToleranceController;
 use super::paths::TIME_STEP_S;
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
-use super::run::{BenchBackend, BenchScene, FrameSample, Timed};
+use super::run::{BenchBackend, BenchScene, Timed};
+use super::sample::FrameSample;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout;
 use crate::draw::{DrawList, Geometry};

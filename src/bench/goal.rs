@@ -5,12 +5,10 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rows::Case;
-use super::run::FrameSample;
+use super::sample::FrameSample;
 use super::statistics::{Spread, middle};
-use crate::lod::budget::{Controller, RANGE_PX, Target};
+use crate::lod::budget::Target;
 use crate::measure::extended;
-use crate::view::{Tolerance, View};
 
 /// A frame whose cost is within this share of the target holds it.
 const BAND: f64 = 0.05;
@@ -35,7 +33,7 @@ impl Goal {
     }
 
     /// What a frame cost, in the goal's unit.
-    fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
+    pub(super) fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
         match self {
             Goal::Triangles(_) => triangles as f64,
             Goal::FrameMs(_) => frame_ms,
@@ -48,33 +46,6 @@ impl fmt::Display for Goal {
         match self {
             Goal::Triangles(count) => write!(f, "{count} triangles"),
             Goal::FrameMs(ms) => write!(f, "{ms} ms"),
-        }
-    }
-}
-
-/// Sets the tolerance of each frame of a flight: the case's own, or what holds its goal.
-pub struct ToleranceController {
-    tolerance: Tolerance,
-    budget: Option<(Goal, Controller)>,
-}
-
-impl ToleranceController {
-    /// Before the first frame.
-    pub fn new(case: &Case) -> Self {
-        let controller = |goal: Goal| (goal, Controller::new(goal.target(), case.tolerance_px, RANGE_PX));
-        Self { tolerance: case.tolerance(), budget: case.goal.map(controller) }
-    }
-
-    /// The next frame's view.
-    pub fn view(&self, view: &View) -> View {
-        let px = self.budget.as_ref().map_or(self.tolerance.px, |(_, controller)| controller.tolerance_px());
-        View { tolerance: Tolerance { px, ..self.tolerance }, ..*view }
-    }
-
-    /// Takes what a frame cost that was drawn for a view.
-    pub fn learn(&mut self, view: &View, triangles: u64, frame_ms: f64) {
-        if let Some((goal, controller)) = &mut self.budget {
-            controller.learn(view.tolerance.px, goal.cost(triangles, frame_ms));
         }
     }
 }

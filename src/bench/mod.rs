@@ -2,6 +2,7 @@
 //! and what changed from one run to another. The driver knows no device: whoever draws is a [`BenchBackend`].
 
 pub mod compare;
+pub mod controller;
 #[cfg(feature = "vulkan")]
 pub mod device;
 pub mod goal;
@@ -13,8 +14,10 @@ pub mod pool;
 pub mod results;
 pub mod rows;
 pub mod run;
+pub mod sample;
 pub mod slowdown;
 pub mod statistics;
 
 pub use rows::{Case, Errors, Header, Row, SCHEMA, Terrain, Times};
-pub use run::{BenchBackend, BenchScene, FrameSample, Timed};
+pub use run::{BenchBackend, BenchScene, Timed};
+pub use sample::FrameSample;

@@ -8,9 +8,10 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
+use super::common::{Common, Outcome};
 use super::scene::{LookArgs, TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
-use super::{Common, Outcome, endless, report};
+use super::{endless, report};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::{Choice, Gpu, Instance};

@@ -78,12 +78,7 @@ pub fn pop(field: &Field, before: State, after: State) -> Pop {
         tally.merge(part_tally);
         histogram.merge(&part_histogram);
     });
-    Pop {
-        p99_px: tally.quantile(),
-        p999_px: tally.quantile_above(1000),
-        max_px: tally.largest,
-        histogram,
-    }
+    Pop { p99_px: tally.quantile(), p999_px: tally.quantile_above(1000), max_px: tally.largest, histogram }
 }
 
 struct Meter<'a> {

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use super::case::{Case, Kind};
 use super::fields::hills;
+use super::finding::Finding;
 use super::forms::Form;
 use super::invariants::{Subject, TOLERANCES_PX, Violation};
-use super::{Case, Finding, Kind, views};
+use super::views;
 use crate::draw::DrawList;
 
 /// The family `arithmetic`. That lists of one view are the same, that numbers are numbers and that weights are in [0, 1]

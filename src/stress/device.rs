@@ -4,8 +4,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 
+use super::ImageChecker;
+use super::case::{Case, Kind};
+use super::finding::Finding;
+use super::flight::Flight;
+use super::forms::Form;
 use super::invariants::Violation;
-use super::{Case, Finding, Flight, Form, ImageChecker, Kind, StressTerrain};
+use super::terrain::StressTerrain;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::Gpu;

@@ -2,8 +2,9 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use super::case::{Case, Kind};
 use super::fields::hills;
-use super::{Case, Finding, Kind};
+use super::finding::Finding;
 use crate::height::save::save;
 use crate::height::{Error, Loaded, Options, load_bytes};
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Finding;
+use super::finding::Finding;
 use super::forms::Form;
 use super::invariants::{SLACK, Violation};
 use super::terrain::all_numbers;

@@ -6,8 +6,11 @@
 //! in the table is in the suite.
 
 mod arithmetic;
+mod case;
+mod extreme_views;
 mod fields;
 mod file;
+mod finding;
 mod flight;
 pub mod forms;
 pub mod invariants;
@@ -25,7 +28,6 @@ pub mod views;
 #[cfg(feature = "vulkan")]
 pub mod device;
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -35,82 +37,19 @@ use rayon::prelude::*;
 use crate::height::Field;
 use crate::view::View;
 
+pub use self::case::{Case, Kind};
+pub use self::finding::Finding;
+use self::finding::panic_text;
 pub use self::flight::Flight;
 pub use self::forms::Form;
-use self::invariants::Violation;
 pub use self::rows::{Picture, Row, SCHEMA, Stress};
 pub use self::terrain::StressTerrain;
-
-/// What a check found.
-#[derive(Clone, Debug)]
-pub struct Finding {
-    /// The check, with its unit where it has one.
-    pub check: &'static str,
-    /// What was found.
-    pub value: f64,
-    /// The most that passes; `None`: it is only told.
-    pub limit: Option<f64>,
-    /// Where it failed, and how.
-    pub violation: Option<Violation>,
-    /// How it failed, where no view is to blame.
-    pub why: Option<String>,
-}
-
-impl Finding {
-    /// A value that is at most a limit.
-    pub fn within(check: &'static str, value: f64, limit: f64) -> Self {
-        Self { check, value, limit: Some(limit), violation: None, why: None }
-    }
-
-    /// A value that is only told: what others are compared with.
-    pub fn reported(check: &'static str, value: f64) -> Self {
-        Self { check, value, limit: None, violation: None, why: None }
-    }
-
-    /// 0 where something holds, else 1.
-    pub fn holds(check: &'static str, outcome: Result<(), Violation>) -> Self {
-        let violation = outcome.err();
-        Self { violation: violation.clone(), ..Self::within(check, f64::from(u8::from(violation.is_some())), 0.0) }
-    }
-
-    /// The same, with how it failed.
-    pub fn because(self, why: Option<String>) -> Self {
-        Self { why, ..self }
-    }
-
-    /// Whether the value is within its limit; no number never is.
-    pub fn passes(&self) -> bool {
-        self.limit.is_none_or(|limit| self.value <= limit)
-    }
-}
-
-/// What is done in a case.
-pub enum Kind {
-    /// Every technique draws a field from views, and every law is held against what it draws.
-    Terrain(fn() -> StressTerrain),
-    /// Every technique, in every word of its settings, is flown; each frame is one surface within its tolerance.
-    Flight(fn() -> Flight),
-    /// Something of its own is done with every technique.
-    Each(fn(&Form) -> Vec<Finding>),
-    /// No technique takes part: whose it is, and what is done.
-    Alone(&'static str, fn() -> Vec<Finding>),
-}
-
-/// A row of the suite.
-pub struct Case {
-    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
-    pub family: &'static str,
-    /// Its name.
-    pub name: &'static str,
-    /// What is done.
-    pub kind: Kind,
-}
 
 /// The suite, family by family.
 pub const FAMILIES: &[&[Case]] = &[
     fields::CASES,
     position::CASES,
-    views::CASES,
+    extreme_views::CASES,
     time::CASES,
     arithmetic::CASES,
     stiff::CASES,
@@ -172,12 +111,6 @@ impl Trial {
         }));
         findings.unwrap_or_else(|panic| vec![Finding::within("panics", 1.0, 0.0).because(Some(panic_text(&*panic)))])
     }
-}
-
-/// The text of a panic.
-fn panic_text(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().cloned();
-    text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
 }
 
 /// The trials of some cases with some techniques: in flights and on their own, the forms of every word.

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use super::case::{Case, Kind};
 use super::fields::{hills, hills_at, seen};
+use super::finding::Finding;
 use super::forms::Form;
 use super::invariants::Violation;
+use super::jitter;
+use super::terrain::StressTerrain;
 use super::terrain::all_numbers;
-use super::{Case, Finding, Kind, StressTerrain, jitter};
 use crate::bench::paths;
 use crate::draw::DrawList;
 use crate::view::{Metric, Tolerance};

@@ -7,9 +7,11 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use image::ImageFormat;
 
+use super::case::Kind;
+use super::finding::Finding;
 use super::forms::Form;
 use super::invariants::Violation;
-use super::{Finding, ImageChecker, Kind, Trial};
+use super::{ImageChecker, Trial};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
 use crate::height::Field;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Finding;
+use super::finding::Finding;
 use super::forms::Form;
 use super::invariants::{INVARIANTS, SLACK, Subject, TOLERANCES_PX, Violation};
 use crate::draw::distance::is_by_distance;

@@ -3,9 +3,12 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use super::case::{Case, Kind};
 use super::fields::hills;
+use super::finding::Finding;
+use super::flight::Flight;
 use super::forms::Form;
-use super::{Case, Finding, Flight, Kind, views};
+use super::{extreme_views, views};
 use crate::bench::paths::{self, TIME_STEP_S};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -69,7 +72,7 @@ fn oscillation(form: &Form) -> Vec<Finding> {
     let all = views::views(&field);
     let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a view of the land").1;
     let (near, far) = (of("from above a corner"), of("far outside"));
-    let Some([before, behind]) = views::threshold(&field, &mut *technique, near, far.eye) else {
+    let Some([before, behind]) = extreme_views::threshold(&field, &mut *technique, near, far.eye) else {
         return vec![Finding::reported("every list is the same", 1.0)];
     };
     // A hair to both sides, a frame each.

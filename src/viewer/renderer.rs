@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use super::Setup;
 use super::hud::Painted;
+use super::setup::Setup;
 use crate::draw::{DrawList, Submission};
 use crate::gpu::frames::Frames;
 use crate::gpu::hud::Hud;

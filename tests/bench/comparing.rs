@@ -4,9 +4,10 @@
 use cuesta::bench::compare::{THRESHOLD, compare};
 use cuesta::bench::results::Results;
 use cuesta::bench::rows::{ErrorRow, Errors, Row, TimeRow, Within};
-use cuesta::measure::summary::Summary;
-use cuesta::bench::run::{FrameSample, Timed};
+use cuesta::bench::run::Timed;
+use cuesta::bench::sample::FrameSample;
 use cuesta::bench::{Case, Times};
+use cuesta::measure::summary::Summary;
 
 use super::mock::{self, Mock};
 

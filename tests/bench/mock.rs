@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::goal::ToleranceController;
+use cuesta::bench::controller::ToleranceController;
 use cuesta::bench::rows::{Decision, Device, Errors, Header, Machine, PendingFrames, Plan, Within, Worst};
-use cuesta::bench::run::{BenchBackend, BenchScene, Ended, FrameSample, Run, Timed};
-use cuesta::bench::{Case, SCHEMA, Terrain};
+use cuesta::bench::run::{BenchBackend, BenchScene, Ended, Run, Timed};
+use cuesta::bench::{Case, FrameSample, SCHEMA, Terrain};
 use cuesta::height::Field;
 use cuesta::height::synth::{Kind, synth};
 use cuesta::measure::economy::Economy;
@@ -110,9 +110,7 @@ impl BenchBackend for Mock {
             p99_px: case.tolerance_px / 2.0,
             p999_px: case.tolerance_px / 1.5,
             max_px: case.tolerance_px,
-            histogram: Histogram {
-                bins: (peak - 5..=peak).map(|k| bin(k, 4u64.pow((peak - k + 1) as u32))).collect(),
-            },
+            histogram: Histogram { bins: (peak - 5..=peak).map(|k| bin(k, 4u64.pow((peak - k + 1) as u32))).collect() },
         });
         errors.watertight = Some(true);
         (errors.hole_pixels, errors.skirt_pixels) = (Some(0), Some(0));

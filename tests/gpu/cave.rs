@@ -62,7 +62,10 @@ fn the_device_draws_the_floor_and_the_ceiling_that_the_host_expands() {
             let samples = here.samples;
             for (there, here) in [(there_m, here.vertical_m), (there_px, here.screen_px)] {
                 let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * b.abs();
-                assert!(samples > 1000 && near(there.count as f64, samples as f64, 2e-3), "{there:?}, {samples} samples");
+                assert!(
+                    samples > 1000 && near(there.count as f64, samples as f64, 2e-3),
+                    "{there:?}, {samples} samples"
+                );
                 assert!(near(there.max, here.max, 1e-4) && near(there.rms, here.rms, 1e-3), "{there:?} {here:?}");
             }
             assert!(here.screen_px.max <= 1.5, "{here:?}");

@@ -6,8 +6,8 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::ground::Ground;
+use super::pose::{Opening, Pose};
 use super::shapes::{along, angles};
-use super::{Opening, Pose};
 
 /// About so many places along a side are looked at.
 const PLACES: u32 = 512;

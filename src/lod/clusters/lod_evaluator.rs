@@ -16,12 +16,15 @@
 use glam::Vec4;
 
 use super::morph_ranges::{MorphRanges, NODE_END};
-use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
 use crate::draw::layout::ClusterView;
 use crate::draw::place::RenderOrigin;
 use crate::height::bounds::Square;
 use crate::view::{Containment, Lens, Metric, View};
+
+/// How far the rasteriser may see edges apart that are not, pixels: it rounds vertices to 1/256 of one, and a skirt may be
+/// seen from almost above.
+const RASTER_PX: f64 = 0.125;
 
 /// Times the true ratio, so that rounding never allows more than [`crate::view::Allowance::error`].
 const GUARD: f32 = 1.0 - 1.0 / 16384.0;

@@ -8,8 +8,6 @@
 
 use super::tree::Tree;
 use crate::draw::distance::{END, weights};
-use crate::height::bounds::{Bounds, ROUNDING};
-use crate::height::{Field, level_errors};
 use crate::view::{Lens, Metric, View};
 
 /// More than single precision may change a distance by.
@@ -23,21 +21,6 @@ pub const NODE_END: f32 = END * 1.0001;
 
 /// Distances end here, metres.
 const FARTHEST_M: f64 = 1e12;
-
-/// What may be off, metres, while blocks go over into each level.
-pub fn errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
-    let (errors, displacements) =
-        (level_errors::largest_errors(bounds), level_errors::largest_displacements(field, bounds));
-    let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
-    let rounding = ROUNDING * low.abs().max(high.abs());
-    let error = |level: usize| match level {
-        0 => 0.0,
-        // Sides of level 0 on the edges of level 1 are as far off as that level's vertices go.
-        1 => errors[1].max(displacements[1] + displacements[1]) + rounding,
-        _ => errors[level].max(errors[level - 1] + displacements[level]) + rounding,
-    };
-    (0..errors.len()).map(error).collect()
-}
 
 /// The ways into all levels in a view.
 #[derive(Clone, Copy, Debug, Default)]

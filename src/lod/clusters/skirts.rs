@@ -18,10 +18,6 @@ use super::tree::{Node, SIDES};
 use crate::draw::skirts;
 use crate::draw::weights::{self, FINER, ONE};
 
-/// How far the rasteriser may see edges apart that are not, pixels: it rounds vertices to 1/256 of one, and a skirt may be
-/// seen from almost above.
-pub const RASTER_PX: f64 = 0.125;
-
 /// Rounding of heights on their way: as `height::bounds` has it.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 

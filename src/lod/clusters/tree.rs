@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
-use super::morph_ranges;
-use crate::height::Field;
-use crate::height::bounds::{Bounds, Measure, Square};
+use crate::height::bounds::{Bounds, Measure, ROUNDING, Square};
 use crate::height::progress::Progress;
+use crate::height::{Field, level_errors};
 
 /// A square of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,7 +110,7 @@ impl Tree {
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
         let errors = match (measure.errors, by_level) {
             (false, _) => Errors::Halved((high - low).max(0.0)),
-            (true, true) => Errors::ByLevel(morph_ranges::errors(field, &bounds)),
+            (true, true) => Errors::ByLevel(morph_errors(field, &bounds)),
             (true, false) => Errors::Measured,
         };
         let last = field.size().map(|n| n - 1);
@@ -198,4 +197,19 @@ impl Tree {
             Errors::Halved(root) => root / (1u64 << (self.root().level - level)) as f32,
         }
     }
+}
+
+/// What may be off, metres, while blocks go over into each level.
+fn morph_errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
+    let (errors, displacements) =
+        (level_errors::largest_errors(bounds), level_errors::largest_displacements(field, bounds));
+    let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
+    let rounding = ROUNDING * low.abs().max(high.abs());
+    let error = |level: usize| match level {
+        0 => 0.0,
+        // Sides of level 0 on the edges of level 1 are as far off as that level's vertices go.
+        1 => errors[1].max(displacements[1] + displacements[1]) + rounding,
+        _ => errors[level].max(errors[level - 1] + displacements[level]) + rounding,
+    };
+    (0..errors.len()).map(error).collect()
 }

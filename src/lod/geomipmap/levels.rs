@@ -1,6 +1,9 @@
 //! Which level a block takes in a view, and how neighbours are brought within one level of each other.
 
-use super::MORPH_RATIO;
+/// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
+/// has left it at this many times that error: a longer way draws the finer level for longer, a shorter one is seen.
+const MORPH_RATIO: f64 = 1.3;
+
 use super::blocks::Blocks;
 use crate::view::View;
 

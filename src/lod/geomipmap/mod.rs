@@ -34,10 +34,6 @@ use crate::draw::{
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
-/// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
-/// has left it at this many times that error: a longer way draws the finer level for longer, a shorter one is seen.
-const MORPH_RATIO: f64 = 1.3;
-
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
     name: "geomipmap",

@@ -18,15 +18,16 @@ use rayon::prelude::*;
 
 use super::blend::Blend;
 use super::certified::{Certified, bounds, guarded};
+use super::context::WalkContext;
 use super::footprint::Footprint;
+use super::limits::{MAX_PAGES, MAX_TRIANGLES, NAME};
 use super::measure::Errors;
 use super::pages::{Grid, Pages, Row, TraversalDirection};
 use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::topology;
-use super::walk::{Stream, WalkContext, Worker};
-use super::{ENTRY, MAX_PAGES, MAX_TRIANGLES, join_streams};
+use super::walk::{Stream, Worker, join_streams};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
 };
@@ -62,8 +63,8 @@ pub struct CaveStrips {
 /// # Errors
 /// One line that says what is expected.
 pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
-    if technique != ENTRY.name {
-        return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
+    if technique != NAME {
+        return Err(format!("a ceiling: expected technique {}, found {technique}", NAME));
     }
     if settings.word("order") == "painter" {
         return Err(

@@ -38,8 +38,10 @@
 pub mod blend;
 pub mod cave;
 pub mod certified;
-pub mod depth_sorter;
+pub mod context;
+mod depth_sorter;
 pub mod footprint;
+mod limits;
 pub mod measure;
 pub mod pages;
 pub mod parts;
@@ -59,14 +61,16 @@ use rayon::prelude::*;
 use self::blend::Blend;
 use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
+use self::context::WalkContext;
 use self::footprint::Footprint;
+use self::limits::{MAX_PAGES, MAX_TRIANGLES, NAME};
 use self::measure::Errors;
 use self::pages::{Grid, Pages, Row, TraversalDirection};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::{Radial, above_m};
-use self::walk::{Stream, WalkContext, Worker};
+use self::walk::{Stream, Worker, join_streams};
 use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
 use crate::draw::{
     DepthMode, Draw, DrawKinds, DrawList, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
@@ -75,17 +79,12 @@ use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, Lens, View};
 
-/// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
-/// widened.
-const MAX_TRIANGLES: usize = 1 << 21;
-/// The most pages: beyond it they are made larger.
-const MAX_PAGES: u64 = 1 << 16;
 /// Triangles of the frame before from which on rows are walked on all cores: for fewer it takes longer to share them out.
 const MIN_PARALLEL: usize = 20_000;
 
 /// The row of the table.
 pub const ENTRY: Entry = Entry {
-    name: "sorted-strips",
+    name: NAME,
     about: "triangles streamed in the order of sight, strip by strip",
     paper: "Finch & Bishop 1998",
     variants: &[Variant { name: "serial", about: "walked on one core, row after row: the same list" }],
@@ -379,18 +378,6 @@ impl SortedStrips {
         self.sequence.arrange(list);
         topology::arrange(self.topology, list);
     }
-}
-
-/// All streams, one after the other; indices count from the first vertex of their own. Both are about as many bytes: one
-/// core copies the vertices, and one the indices.
-fn join_streams(streams: &[&Stream], into: &mut Geometry) {
-    let Geometry { vertices, indices, .. } = into;
-    vertices.clear();
-    indices.clear();
-    rayon::join(
-        || streams.iter().for_each(|stream| vertices.extend_from_slice(&stream.vertices)),
-        || streams.iter().for_each(|stream| indices.extend_from_slice(&stream.indices)),
-    );
 }
 
 impl Technique for SortedStrips {

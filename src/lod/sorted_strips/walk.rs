@@ -26,12 +26,12 @@
 //! vertices are made again, as the paper copies them from page to page.
 
 use super::blend::Blend;
+use super::context::WalkContext;
 use super::depth_sorter::{Crossing, DepthSorter};
 use super::pages::{Pages, Row, Run, TraversalDirection, placed};
-use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
+use super::shapes::{BACK, LEADING, Shape, TRAILING, slot};
 use super::splits::Levels;
-use crate::draw::ExplicitVertex;
-use crate::height::Field;
+use crate::draw::{ExplicitVertex, Geometry};
 
 /// Vertices and indices of a part of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +55,18 @@ impl Stream {
     }
 }
 
+/// All streams, one after the other; indices count from the first vertex of their own. Both are about as many bytes: one
+/// core copies the vertices, and one the indices.
+pub fn join_streams(streams: &[&Stream], into: &mut Geometry) {
+    let Geometry { vertices, indices, .. } = into;
+    vertices.clear();
+    indices.clear();
+    rayon::join(
+        || streams.iter().for_each(|stream| vertices.extend_from_slice(&stream.vertices)),
+        || streams.iter().for_each(|stream| indices.extend_from_slice(&stream.indices)),
+    );
+}
+
 /// What walking a row needs and leaves: kept from frame to frame, it allocates nothing.
 #[derive(Default)]
 pub struct Worker {
@@ -63,22 +75,6 @@ pub struct Worker {
     marks: Vec<Mark>,
     start: Vec<u32>,
     sorter: DepthSorter,
-}
-
-/// What every row of a frame is walked with.
-pub struct WalkContext<'a, L> {
-    /// The field.
-    pub field: &'a Field,
-    /// The pages to be drawn.
-    pub pages: &'a Pages,
-    /// The level function.
-    pub levels: &'a L,
-    /// All kinds of quads.
-    pub shapes: &'a Shapes,
-    /// Where the eye is and looks.
-    pub traversal: TraversalDirection,
-    /// How vertices go over into the next level.
-    pub blend: Blend,
 }
 
 /// A vertex that is used but not made yet.

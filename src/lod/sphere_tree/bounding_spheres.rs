@@ -13,7 +13,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::front::{CrossingTracker, Front, TrackingHandle};
-use super::measure::Known;
+use super::known::Known;
 use super::reach::Viewpoint;
 
 /// The shells about one place.

@@ -10,8 +10,9 @@
 use glam::DVec3;
 
 use super::bounding_spheres::BoundingSpheres;
-use super::front::{ByIndex, CrossingTracker, Front, TrackingHandle};
-use super::measure::Known;
+use super::by_index::ByIndex;
+use super::front::{CrossingTracker, Front, TrackingHandle};
+use super::known::Known;
 use super::reach::Viewpoint;
 
 /// Where to look, in distances of the diamond in plan: past one that may split, and short of one that may merge.

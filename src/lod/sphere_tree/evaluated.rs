@@ -11,11 +11,13 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use rayon::prelude::*;
 
-use super::front::ByIndex;
+use super::by_index::ByIndex;
 use super::lattice::{Place, half_length};
-use super::measure::SPARE;
 use crate::height::bezier::{Area, Bezier, SPACING_M};
 use crate::height::bounds::ROUNDING;
+
+/// What rounding may take from a ball, relative: far more than that of a distance in f64.
+pub const SPARE: f64 = 1e-6;
 
 /// What is kept is in so many parts, so that few wait for each other, each of at most so many diamonds.
 const PARTS: usize = 64;

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::evaluated::{Evaluated, Size};
+use super::evaluated::{Evaluated, SPARE, Size};
+pub use super::known::Known;
 use super::lattice::{Diamond, Lattice, Place};
 use super::reach::Reach;
 use crate::height::Field;
@@ -19,9 +20,6 @@ use crate::height::bounds::ROUNDING;
 use crate::height::progress::Progress;
 use crate::height::surface::{self, Corner};
 use crate::view::{Tolerance, View};
-
-/// What rounding may take from a ball, relative: far more than that of a distance in f64.
-pub const SPARE: f64 = 1e-6;
 
 /// A field with its diamonds measured.
 pub struct Measured {
@@ -40,21 +38,6 @@ pub struct Measured {
     rounding: f32,
     /// In place of errors and balls where there are no samples to measure.
     evaluated: Option<Evaluated>,
-}
-
-/// A diamond with what is known of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Known {
-    /// Its middle on the lattice.
-    pub at: Place,
-    /// Its index.
-    pub index: usize,
-    /// Its middle from the field's first sample on, at its height, metres.
-    pub centre: DVec3,
-    /// Metres.
-    pub error: f32,
-    /// Metres.
-    pub ball: f32,
 }
 
 impl Measured {

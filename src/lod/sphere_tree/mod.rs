@@ -22,9 +22,11 @@
 
 pub mod blocks;
 pub mod bounding_spheres;
+pub mod by_index;
 pub mod covers;
 pub mod evaluated;
 pub mod front;
+pub mod known;
 pub mod lattice;
 pub mod measure;
 pub mod mesh;

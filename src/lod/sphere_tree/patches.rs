@@ -28,9 +28,17 @@ use range_alloc::RangeAllocator;
 
 use super::blocks::Blocks;
 use super::lattice::Place;
-use super::mesh::Piece;
 use super::splits::Changes;
 use crate::draw::{ExplicitVertex, Geometry, Limits, Upload};
+
+/// The triangles of one draw.
+#[derive(Default)]
+pub struct Piece {
+    /// Vertices.
+    pub vertices: Vec<ExplicitVertex>,
+    /// Three a triangle.
+    pub indices: Vec<u32>,
+}
 
 /// The most bytes uploaded in a frame: a staging buffer of this size is made for each frame in flight.
 const UPLOAD_BYTES: usize = 32 << 20;

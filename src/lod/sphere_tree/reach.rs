@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::measure::Known;
+use super::known::Known;
 use crate::view::{Lens, Metric, View};
 
 /// How far errors reach in the views of one lens, picture and tolerance.

@@ -1,6 +1,6 @@
 //! The diamonds that have split, and the plain way to find them: look at every one again.
 
-use super::front::ByIndex;
+use super::by_index::ByIndex;
 use super::lattice::Place;
 use super::measure::Measured;
 use super::reach::Viewpoint;

@@ -8,8 +8,10 @@
 //! 3. where a triangle has no neighbour, floor and ceiling have the same edge: the same two ends in space. Elsewhere the
 //!    cave is open, and that may be at the rim of the field only, or out of sight.
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::{self, BorderEdge};
-use super::{CounterExample, Kind, faces_up, on_the_field, one_height_a_vertex, refuted, sweep};
+use super::sweep;
+use super::vertices::{faces_up, on_the_field, one_height_a_vertex};
 use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, doubled_area};

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::{CounterExample, Kind, refuted};
+use super::counter_example::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 
 /// An edge of a triangle that no other triangle uses the other way round. The land is to the left of it, seen

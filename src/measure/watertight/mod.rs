@@ -21,62 +21,24 @@
 //! Surfaces with skirts have gaps between edges, which [`prove_with_skirts`] finds and shows hidden instead of 2 to 4.
 
 pub mod cave;
+pub mod counter_example;
 mod edges;
 pub mod plan;
 mod seams;
 mod sweep;
+mod vertices;
 
 use std::io::{self, Write};
-
-use rayon::prelude::*;
 
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, Geometry, Seams};
 use crate::height::Field;
-use crate::height::surface::{self, Corner, Triangle, doubled_area};
+use crate::height::surface::{self, Triangle, doubled_area};
 use crate::view::{Frustum, View};
 
-/// What is wrong with a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
-    /// A corner lies outside the field.
-    Outside,
-    /// A triangle faces down.
-    Fold,
-    /// One vertex has two heights.
-    Crack,
-    /// Land is covered more than once.
-    Overlap,
-    /// A vertex of one triangle lies inside an edge of another.
-    TJunction,
-    /// Land with data, perhaps in sight, is not covered.
-    Gap,
-    /// One edge lies above another, and no skirt hides what is between them.
-    Seam,
-}
-
-/// The fewest triangles that show what is wrong.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CounterExample {
-    /// What is wrong.
-    pub kind: Kind,
-    /// The triangles at fault, as they were given; for a gap the samples' one that is missing.
-    pub triangles: Vec<Triangle>,
-    /// What is wrong with them, and where.
-    pub text: String,
-}
-
-impl std::fmt::Display for CounterExample {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{:?}: {}", self.kind, self.text)?;
-        self.triangles.iter().try_for_each(|[a, b, c]| {
-            write!(f, "; ({}, {}, {}) ({}, {}, {}) ({}, {}, {})", a.x, a.z, a.y, b.x, b.z, b.y, c.x, c.z, c.y)
-        })
-    }
-}
-
-impl std::error::Error for CounterExample {}
+pub use self::counter_example::{CounterExample, Kind};
+use self::vertices::{faces_up, on_the_field, one_height_a_vertex};
 
 /// What was proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,52 +145,6 @@ pub fn prove_list(
             prove_with_skirts(field, &frustum, &triangles, &skirts)
         }
     }
-}
-
-/// A refutation by some of the triangles.
-fn refuted<T>(
-    kind: Kind,
-    triangles: &[Drawn],
-    guilty: impl IntoIterator<Item = u32>,
-    text: String,
-) -> Result<T, Box<CounterExample>> {
-    let guilty: Vec<&Drawn> = guilty.into_iter().map(|k| &triangles[k as usize]).collect();
-    let instances: Vec<_> = guilty.iter().map(|t| t.instance.to_string()).collect();
-    let text = format!("{text} (instances {})", instances.join(", "));
-    Err(Box::new(CounterExample { kind, triangles: guilty.iter().map(|t| t.corners).collect(), text }))
-}
-
-fn on_the_field(field: &Field, triangles: &[Drawn], fraction_bits: u32) -> Result<(), Box<CounterExample>> {
-    let [w, h] = field.size().map(|n| n as i32);
-    let [last_x, last_z] = [w, h].map(|n| (n - 1) << fraction_bits);
-    let outside = |c: &Corner| !(0..=last_x).contains(&c.x) || !(0..=last_z).contains(&c.z);
-    match triangles.iter().position(|t| t.corners.iter().any(outside)) {
-        Some(k) => refuted(Kind::Outside, triangles, [k as u32], format!("a corner outside {w} × {h} samples")),
-        None => Ok(()),
-    }
-}
-
-fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    match triangles.iter().position(|t| doubled_area(&t.corners) <= 0) {
-        Some(k) => refuted(Kind::Fold, triangles, [k as u32], "a triangle that does not face up".into()),
-        None => Ok(()),
-    }
-}
-
-fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    // Position, height, triangle as one number, which sorts fast.
-    let vertex = |corner: Corner, k: u32| {
-        let position = u128::from(edges::packed([corner.x, corner.z]));
-        position << 64 | u128::from(corner.y.to_bits()) << 32 | u128::from(k)
-    };
-    let mut vertices: Vec<u128> =
-        (0u32..).zip(triangles).flat_map(|(k, t)| t.corners.map(|corner| vertex(corner, k))).collect();
-    vertices.par_sort_unstable();
-    let differ = |[a, b]: &&[u128; 2]| a >> 64 == b >> 64 && a >> 32 != b >> 32;
-    let Some(&[a, b]) = vertices.array_windows().find(differ) else { return Ok(()) };
-    let [x, z] = edges::unpacked((a >> 64) as u64);
-    let [low, high] = [a, b].map(|v| f32::from_bits((v >> 32) as u32));
-    refuted(Kind::Crack, triangles, [a as u32, b as u32], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
 }
 
 /// Writes triangles, whose corners have so many fraction bits, as ASCII PLY, world metres.

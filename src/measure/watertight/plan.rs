@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage};
 
-use super::{CounterExample, Kind};
+use super::counter_example::{CounterExample, Kind};
 use crate::draw::expand::Drawn;
 use crate::height::surface::{Corner, Triangle, doubled_area};
 

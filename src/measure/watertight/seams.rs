@@ -9,8 +9,8 @@
 
 use rayon::prelude::*;
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::{self, BorderEdge};
-use super::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle};

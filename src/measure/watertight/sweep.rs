@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::BorderEdge;
-use super::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 use crate::height::surface::{Corner, is_terrain};
 use crate::height::{Field, rtin};

@@ -7,14 +7,30 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Failure;
 use super::terrain::Terrain;
 use super::viewpoint::Viewpoint;
 use crate::height::Field;
 use crate::lod::{self, Entry, Settings};
+use crate::stress::finding::panic_text;
 use crate::stress::invariants::{INVARIANTS, Subject, Violation};
-use crate::stress::panic_text;
 use crate::view::{Metric, Tolerance, View};
+
+/// A case that does not keep an invariant.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// The case.
+    pub case: SweepCase,
+    /// The invariant.
+    pub invariant: &'static str,
+    /// The view and the reason.
+    pub violation: Violation,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
+    }
+}
 
 /// A technique with settings, terrain, a view and a tolerance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -12,10 +12,10 @@ pub mod viewpoint;
 
 use rayon::prelude::*;
 
-pub use self::case::SweepCase;
+pub use self::case::{Failure, SweepCase};
+use super::case::{Case, Kind};
+use super::finding::Finding;
 use super::forms::Form;
-use super::invariants::Violation;
-use super::{Case, Finding, Kind};
 
 /// The family `sweep`.
 pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::Each(of_form) }];
@@ -26,23 +26,6 @@ const SUITE_SEED: u64 = 19;
 
 /// Failures that are made smaller, at most: each takes as long as hundreds of cases.
 const MAX_SHRUNK: usize = 4;
-
-/// A case that does not keep an invariant.
-#[derive(Clone, Debug)]
-pub struct Failure {
-    /// The case.
-    pub case: SweepCase,
-    /// The invariant.
-    pub invariant: &'static str,
-    /// The view and the reason.
-    pub violation: Violation,
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
-    }
-}
 
 /// Runs cases on all cores. Returns the failures in order, the first few of them shrunk.
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {

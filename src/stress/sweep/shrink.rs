@@ -1,7 +1,6 @@
 //! From a case that fails to a simpler one that fails in the same way.
 
-use super::Failure;
-use super::case::SweepCase;
+use super::case::{Failure, SweepCase};
 use super::terrain::Voids;
 use super::viewpoint::{CaseLens, Direction, Viewpoint};
 
