@@ -1,41 +1,18 @@
 //! The suite finds what is broken, says where, and keeps what shows it.
 
-use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
-use cuesta::height::{Field, Options, load};
-use cuesta::lod::{Entry, Settings, Technique, geomipmap};
+use cuesta::draw::{DrawList, Geometry, Limits};
+use cuesta::height::{Options, load};
+use cuesta::lod::{Entry, Technique, geomipmap};
 use cuesta::stress::jitter::{Jitter, LIMIT_PX, Way};
 use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
 use cuesta::stress::{Case, Finding, Form, Kind, Trial, cases, forms, saved};
 use cuesta::view::View;
 
-/// GeoMipMapping without its last block.
-struct BlockLost(Box<dyn Technique>);
+use crate::altered::BLOCK_LOST;
 
 /// A technique that panics in every view.
 struct Panics(Geometry);
-
-impl Technique for BlockLost {
-    fn resident(&self) -> &Geometry {
-        self.0.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.0.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.0.select(view, list);
-        if let Some(draw) = list.draws.last_mut() {
-            draw.instances.end -= 1;
-        }
-    }
-    fn keeps_tolerance(&self) -> bool {
-        true
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        self.0.pipeline_requirements()
-    }
-}
 
 impl Technique for Panics {
     fn resident(&self) -> &Geometry {
@@ -52,11 +29,6 @@ impl Technique for Panics {
     }
 }
 
-fn block_lost(field: Arc<Field>, settings: &Settings) -> Box<dyn Technique> {
-    Box::new(BlockLost((geomipmap::ENTRY.build)(field, settings)))
-}
-
-static BLOCK_LOST: Entry = Entry { name: "block-lost", build: block_lost, ..geomipmap::ENTRY };
 static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 

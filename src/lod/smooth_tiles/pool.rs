@@ -35,6 +35,11 @@ impl Pool {
         Self { page, sizes, pages, empty: (0..count).rev().collect(), open }
     }
 
+    /// Vertices of a chunk by level.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
     /// Vertices of all pages.
     pub fn vertices(&self) -> usize {
         self.pages.len() * self.page
@@ -60,6 +65,13 @@ impl Pool {
     pub fn vertices_for(sizes: &[usize], chunks: &[usize]) -> usize {
         let page = CHUNKS * sizes[0];
         sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
+    }
+
+    /// Vertices of a buffer that holds these chunks by level, with a page more of each of their levels, and a page of
+    /// every level for chunks that give way.
+    pub fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
+        let used = chunks.iter().filter(|&&count| count > 0).count();
+        Self::vertices_for(sizes, chunks) + used * CHUNKS * sizes[0]
     }
 
     /// Vertices of pages that hold a number of chunks of any levels, with two pages of each level more.
