@@ -1,5 +1,4 @@
-//! The laboratory that draws on a device: a technique's stage for each scene, and everything that is measured of its
-//! frames.
+//! The backend that draws on a device: a technique's renderer for each scene, and the measurements of its frames.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -47,7 +46,7 @@ impl DeviceBackend {
         Ok(plan.with_requirements(technique.pipeline_requirements()))
     }
 
-    /// A technique as it is when just made, and its stage.
+    /// A freshly prepared technique and its renderer.
     fn set(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
         let technique = build(scene.case, scene.field)?;
         let plan = self.plan(scene.field, technique.as_ref())?;

@@ -1,4 +1,4 @@
-//! Holding a cost along a path: what a case asks for, the tolerance of each frame, and how well it was held.
+//! Goals: a cost to hold along a path, and the deviation from it.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use crate::measure::extended;
 /// A frame whose cost is within this share of the target holds it.
 const BAND: f64 = 0.05;
 
-/// What every frame is to cost, by moving the tolerance.
+/// Cost that every frame is held at by moving the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
@@ -32,7 +32,7 @@ impl Goal {
         }
     }
 
-    /// What a frame cost, in the goal's unit.
+    /// Returns the cost of a frame in the goal's unit.
     pub(super) fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
         match self {
             Goal::Triangles(_) => triangles as f64,
@@ -50,7 +50,7 @@ impl fmt::Display for Goal {
     }
 }
 
-/// How well a goal was held along a path.
+/// Deviation from a goal along a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct BudgetStats {
@@ -62,9 +62,9 @@ pub struct BudgetStats {
     /// Share, 0 to 1, of the frames from that one on that are within it; 0 if there is none.
     #[schemars(range(max = 1.0))]
     pub settled: f64,
-    /// Most that a frame from that one on cost, over the goal.
+    /// Largest cost of a frame from that one on, divided by the goal.
     pub max: f64,
-    /// Tolerances used, pixels.
+    /// Tolerances of the frames, pixels.
     pub tolerance_px: Spread,
 }
 

@@ -1,5 +1,6 @@
-//! Error against run time: named paths, cases run in turn in one process, rows that reach the file as they come,
-//! and what changed from one run to another. The driver knows no device: whoever draws is a [`BenchBackend`].
+//! Error against run time: named camera paths, cases run in turn in one process, and the comparison of two runs.
+//!
+//! Each row reaches the file as soon as it is measured. The driver needs no device: a [`BenchBackend`] draws.
 
 pub mod compare;
 pub mod controller;

@@ -1,6 +1,6 @@
 //! Measurements of one frame.
 
-/// What one frame took.
+/// Measurements of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameSample {
     /// From the start of selection until the picture is done, milliseconds.
@@ -23,9 +23,9 @@ pub struct FrameSample {
     pub draws: u64,
     /// Draw commands recorded.
     pub commands: u64,
-    /// What the tolerance was multiplied by: 1 where it was kept.
+    /// Factor by which the tolerance grew because the list did not fit: 1 if it was kept.
     pub tolerance_scale: f64,
-    /// Instances in sight whose refinement waited.
+    /// Visible instances whose refinement is pending.
     pub pending: u64,
     /// Error allowed, pixels.
     pub tolerance_px: f64,

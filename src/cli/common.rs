@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-/// What every subcommand takes.
+/// Flags of every subcommand.
 #[derive(Args, Debug, Clone, Default)]
 pub struct Common {
     /// One JSON document on stdout and nothing else there.
@@ -17,15 +17,15 @@ pub struct Common {
     /// Validation layers on; any message makes the exit code 1.
     #[arg(long, global = true)]
     pub validate: bool,
-    /// Device memory is out after so many allocations: to try what happens then.
+    /// Device memory runs out after N allocations, for testing.
     #[arg(long, global = true, value_name = "N")]
     pub allocations: Option<u64>,
-    /// The device is lost after so many calls that would notice: to try what happens then.
+    /// The device is lost after N calls that would notice, for testing.
     #[arg(long, global = true, value_name = "N")]
     pub lose_device: Option<u64>,
 }
 
-/// How a run ended, if it did not fail.
+/// Outcome of a run that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything asked for was done: exit code 0.

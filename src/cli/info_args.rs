@@ -13,13 +13,13 @@ pub struct InfoArgs {
     /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; or `demo`.
     #[arg(required_unless_present = "devices")]
     pub terrain: Vec<String>,
-    /// How heights are read.
+    /// Options for reading heights.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// What this scene needs on the device, and what it leaves out.
+    /// Show what this scene needs on the device, and what it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
-    /// Also how much each feature that is left out would take: each is kept once, for so many frames of the view.
+    /// Also measure the cost of each feature that is left out: each is kept once, for FRAMES frames of the view.
     #[arg(long, value_name = "FRAMES", requires = "plan", num_args = 0..=1, default_missing_value = "30")]
     pub measure: Option<usize>,
     /// Draws which nodes of a map of 2^36 texels over the field the view needs, and how fine: a .png.

@@ -1,7 +1,7 @@
-//! What triangles cost: how many there are, how many of them show, and how large they are on the screen.
+//! Cost of triangles: their number, how many of them show, and their size on the screen.
 //!
-//! A triangle's size is the exact area of its projection, clipped to the picture; what other land hides of it
-//! is not taken off. Those that other land hides are counted apart ([`Depths`]).
+//! A triangle's size is the exact area of its projection, clipped to the picture. Parts hidden by other terrain are not
+//! subtracted; triangles hidden as a whole are counted ([`Depths`]).
 
 use glam::DVec4;
 use schemars::JsonSchema;
@@ -122,7 +122,7 @@ impl Triangles {
         self.sizes_px.merge(&part.sizes_px);
     }
 
-    /// Counts a triangle by its signed area in the picture and whether it is hidden; `None` if it has no part in it.
+    /// Counts a triangle by its signed area in the picture and its visibility; `None` if it lies outside.
     fn add(&mut self, seen: Option<(f64, bool)>) {
         match seen {
             None => self.outside += 1,
@@ -137,7 +137,7 @@ impl Triangles {
     }
 }
 
-/// What triangles are projected with.
+/// Data for projecting triangles.
 struct Screen<'a> {
     field: &'a Field,
     view: &'a View,
@@ -160,7 +160,7 @@ impl<'a> Screen<'a> {
         found
     }
 
-    /// The area, pixels, that a triangle has in the picture, negative if it faces away, and whether it is hidden;
+    /// Returns the area of a triangle in the picture, pixels, negative if it faces away, and true if it is hidden.
     /// `None` if it lies outside.
     fn seen(&self, triangle: &Triangle, fraction_bits: u32) -> Option<(f64, bool)> {
         let corners = triangle.each_ref().map(|corner| {
@@ -173,7 +173,8 @@ impl<'a> Screen<'a> {
     }
 }
 
-/// How far inside the sides, the near and the far plane a point of clip space is (depth reversed).
+/// Signed distances of a point of clip space from the sides, the near and the far plane; positive inside (reversed
+/// depth).
 fn inside(p: DVec4) -> [f64; 6] {
     [p.w - p.x, p.w + p.x, p.w - p.y, p.w + p.y, p.w - p.z, p.z]
 }

@@ -1,4 +1,4 @@
-//! How far a picture is from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
+//! Difference of a picture from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
 //!
 //! - SSIM: Z. Wang, A. Bovik, H. Sheikh and E. Simoncelli, "Image Quality Assessment: From Error Visibility to
 //!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of §III.C, on luma
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::extended::{self, Extended};
 
-/// How finely the eye that FLIP stands for sees the pictures: a screen 0.7 m wide with 3840 pixels, 0.7 m away.
+/// Viewing condition of FLIP, pixels per degree: a screen 0.7 m wide with 3840 pixels, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
 /// Samples along a side of SSIM's window, and its standard deviation.

@@ -149,7 +149,7 @@ mod tests {
         cells.flat_map(|(i, j)| rtin::cell(i, j)).map(|t| t.map(world)).collect()
     }
 
-    /// Where a ray meets a triangle (Möller and Trumbore 1997), in lengths of its direction.
+    /// Returns the distance at which a ray meets a triangle (Möller and Trumbore 1997), in lengths of its direction.
     fn meets(from: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
         let (ab, ac) = (b - a, c - a);
         let across = direction.cross(ac);
@@ -161,7 +161,7 @@ mod tests {
         (u >= -1e-9 && v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 0.0).then_some(t)
     }
 
-    /// What a pixel's ray meets first, and its depth, by the clip matrix.
+    /// Returns the first hit of a pixel's ray, and its depth by the clip matrix.
     fn cast(view: &View, triangles: &[[DVec3; 3]], pixel: [usize; 2]) -> Option<(DVec3, f32)> {
         let clip = |k: usize| 2.0 * (pixel[k] as f64 + 0.5) / f64::from(view.size[k]) - 1.0;
         let world_from_clip = view.clip_from_relative().inverse();

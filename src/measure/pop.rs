@@ -26,8 +26,8 @@ use crate::view::View;
 /// Powers of two, px, between which the histogram has its bins: from 1/64 px, far below what anybody sees, to 64.
 const BINS: [i32; 2] = [-6, 6];
 
-/// What a frame was drawn from. A technique with uploads changes its resident geometry from frame to frame:
-/// then a copy from before goes with the list from before.
+/// The data of a drawn frame. A technique with uploads changes its resident geometry from frame to frame: the earlier
+/// state then needs a copy of it.
 #[derive(Clone, Copy, Debug)]
 pub struct State<'a> {
     /// The view that the list was made for.

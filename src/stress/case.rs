@@ -5,7 +5,7 @@ use super::flight::Flight;
 use super::forms::Form;
 use super::terrain::StressTerrain;
 
-/// What is done in a case.
+/// The check of a case.
 pub enum Kind {
     /// Every technique draws a field from views, and every law is held against what it draws.
     Terrain(fn() -> StressTerrain),
@@ -19,10 +19,10 @@ pub enum Kind {
 
 /// A row of the suite.
 pub struct Case {
-    /// Which part of it: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
+    /// Part of the suite: `data`, `position`, `view`, `time`, `arithmetic`, `stiff`, `file` or `sweep`.
     pub family: &'static str,
     /// Its name.
     pub name: &'static str,
-    /// What is done.
+    /// The check.
     pub kind: Kind,
 }

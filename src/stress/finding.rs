@@ -4,18 +4,18 @@ use std::any::Any;
 
 use super::invariants::Violation;
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The check, with its unit where it has one.
     pub check: &'static str,
-    /// What was found.
+    /// Measured value.
     pub value: f64,
     /// The most that passes; `None`: it is only told.
     pub limit: Option<f64>,
-    /// Where it failed, and how.
+    /// View and reason of the failure.
     pub violation: Option<Violation>,
-    /// How it failed, where no view is to blame.
+    /// Reason of a failure that belongs to no view.
     pub why: Option<String>,
 }
 
@@ -41,7 +41,7 @@ impl Finding {
         Self { why, ..self }
     }
 
-    /// Whether the value is within its limit; no number never is.
+    /// Returns true if the value is within its limit; NaN never is.
     pub fn passes(&self) -> bool {
         self.limit.is_none_or(|limit| self.value <= limit)
     }

@@ -1,6 +1,6 @@
-//! How a virtual texture is cut into pages and tiles, and how many of them are kept.
+//! Layout of a virtual texture: its pages and tiles, and the number of tiles in memory.
 
-/// How a picture is cut, and how much of it is kept.
+/// Pages and tiles of a picture, and the number of tiles in memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VirtualTextureLayout {
     /// Pages along (x, z).

@@ -13,7 +13,7 @@ use crate::lod::{Entry, Settings};
 use crate::plan::Look;
 use crate::view::View;
 
-/// What is to be seen.
+/// Terrain, view and options of a window session.
 pub struct Setup {
     /// The terrain's name, for the title.
     pub name: String,
@@ -25,15 +25,15 @@ pub struct Setup {
     pub near: Option<f64>,
     /// The technique and its settings.
     pub technique: (&'static Entry, Settings),
-    /// What was set on that technique.
+    /// Settings chosen for that technique.
     pub choices: Vec<(String, String)>,
-    /// What a frame is to cost, by moving the view's tolerance.
+    /// Cost that frames are held at by moving the view's tolerance.
     pub target: Option<Target>,
-    /// How the land looks.
+    /// Appearance of the terrain.
     pub look: Look,
     /// A picture laid over it, for when the colours are its.
     pub overlay: Option<image::RgbaImage>,
-    /// Which device.
+    /// Choice of device.
     pub choice: Choice,
     /// Validation layers on.
     pub validate: bool,
@@ -47,7 +47,7 @@ pub struct Setup {
     pub on_interrupt: fn(Box<dyn FnOnce() + Send>),
 }
 
-/// How a session went.
+/// Summary of a session.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// The device's name.
@@ -58,6 +58,6 @@ pub struct Summary {
     pub seconds: f64,
     /// Times from frame to frame, milliseconds.
     pub frame_ms: Percentiles,
-    /// What the validation layers said, to the end of everything.
+    /// Messages of the validation layers, up to shutdown.
     pub messages: Vec<String>,
 }

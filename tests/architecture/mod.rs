@@ -42,7 +42,7 @@ const EVERYTHING: &[&str] = &[
     "viewer", "report", "renamed",
 ];
 
-/// What is wrong with a file of `src`, each as `file:line: what`. `file` is relative to `src`.
+/// Returns the violations in a file of `src`, each as `file:line: what`. `file` is relative to `src`.
 fn violations(file: &str, text: &str) -> Vec<String> {
     let code = paths::without_comments(text);
     let module = paths::module_of(file);
@@ -67,7 +67,7 @@ fn violations(file: &str, text: &str) -> Vec<String> {
             }
         }
     }
-    // What tests say goes to whoever runs them.
+    // Tests may print.
     let of_program =
         if file.ends_with("tests.rs") { "" } else { code.split("#[cfg(test)]").next().unwrap_or_default() };
     for (line, text) in of_program.lines().enumerate() {
@@ -79,7 +79,7 @@ fn violations(file: &str, text: &str) -> Vec<String> {
     found
 }
 
-/// Why a module may not use a path of the crate, if so.
+/// Returns the reason that forbids a module to use a path of the crate, if any.
 fn forbidden(module: &[String], target: &[String]) -> Option<String> {
     // The crate's root declares all modules, and the program's calls the command line.
     let (from, to) = (module.first()?, target.first()?);

@@ -1,4 +1,4 @@
-//! A laboratory without a device: times, errors and pictures from a formula, the same in every run.
+//! A backend without a device: times, errors and pictures from a formula, the same in every run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,7 +25,7 @@ use image::{Rgb, RgbImage};
 /// Its one adjustable thing: what it leaves unmeasured.
 #[derive(Default)]
 pub struct Mock {
-    /// Only what every laboratory must give.
+    /// Omit all optional measurements.
     pub is_bare: bool,
     /// Calls so far.
     pub calls: Vec<String>,

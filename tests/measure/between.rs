@@ -68,7 +68,7 @@ fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     assert_eq!(proof, proof_finer);
 }
 
-/// Whether a triangle has a corner somewhere, and which.
+/// Returns the index of a triangle's corner at a position, if any.
 fn corner_at(triangle: &Drawn, at: [i32; 2]) -> Option<usize> {
     triangle.corners.iter().position(|c| [c.x, c.z] == at)
 }

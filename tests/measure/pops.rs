@@ -44,7 +44,7 @@ fn heights(triangles: &[Drawn]) -> HashMap<[u32; 2], f64> {
     heights
 }
 
-/// What the meter finds from frame to frame, and the largest displacement by hand.
+/// Returns the measured pops from frame to frame, and the largest displacement computed by hand.
 fn journey(settings: &[(&str, &str)]) -> Vec<(Pop, f64)> {
     let field = terrain();
     let mut technique = technique(&field, "geomipmap", settings);

@@ -1,4 +1,4 @@
-//! The oracle against a check written another way: rays cast at the drawn triangles in world space, and both ends
+//! The measured errors against an independent check: rays cast at the drawn triangles in world space, and both ends
 //! projected without the crate's own matrices.
 
 use std::sync::Arc;
@@ -53,7 +53,7 @@ fn random_view(random: &mut Random) -> View {
     }
 }
 
-/// Where a ray straight down from above a point meets a triangle (Möller and Trumbore 1997).
+/// Returns the point where a vertical ray from above meets a triangle (Möller and Trumbore 1997).
 fn meets(at: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let from = at.with_y(a.y.max(b.y).max(c.y) + 1.0);
     let (ab, ac) = (b - a, c - a);
@@ -112,8 +112,8 @@ fn is_parallel(view: &View) -> bool {
     matches!(view.lens, Lens::Orthographic { .. })
 }
 
-/// Whether, of the triangles of a sample with a neighbour along x and one along z, some face the eye and some do
-/// not: by their normals.
+/// Returns true if, of the triangles of a sample with a neighbour along x and one along z, some face the eye and some do
+/// not, by their normals.
 fn turns_away(field: &Field, view: &View, i: u32, j: u32) -> bool {
     let [w, h] = field.size();
     let here = field.world(i, j);

@@ -1,6 +1,5 @@
 //! The suite finds what is broken, says where, and keeps what shows it.
 
-
 use cuesta::draw::{DrawList, Geometry, Limits};
 use cuesta::height::{Options, load};
 use cuesta::lod::{Entry, Technique, geomipmap};

@@ -20,7 +20,7 @@ pub const TIME_STEP_S: f64 = 1.0 / 60.0;
 pub struct Path {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// Description in one sentence.
     pub about: &'static str,
     poses: fn(&Ground, usize) -> Vec<Pose>,
 }

@@ -13,7 +13,7 @@ pub struct Pose {
     pub yaw: f64,
     /// Degrees above the horizon.
     pub pitch: f64,
-    /// How wide the view is.
+    /// Field of view.
     pub opening: Opening,
 }
 

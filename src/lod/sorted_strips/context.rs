@@ -8,7 +8,7 @@ use crate::draw::ExplicitVertex;
 use crate::draw::place::morphed_height;
 use crate::height::Field;
 
-/// What every row of a frame is walked with.
+/// Data for walking all rows of a frame.
 pub struct WalkContext<'a, L> {
     /// The field.
     pub field: &'a Field,
@@ -18,9 +18,9 @@ pub struct WalkContext<'a, L> {
     pub levels: &'a L,
     /// All kinds of quads.
     pub shapes: &'a Shapes,
-    /// Where the eye is and looks.
+    /// Position and direction of the eye.
     pub traversal: TraversalDirection,
-    /// How vertices go over into the next level.
+    /// Transition of vertices into the next level.
     pub blend: Blend,
 }
 

@@ -1,4 +1,4 @@
-//! How far the as-drawn triangles are from the samples: vertically in metres, and on the screen in pixels.
+//! Distance of the drawn triangles from the samples: vertically in metres, and on the screen in pixels.
 //!
 //! Measured is every sample with data inside or on the border of a drawn triangle, if the drawn point above
 //! or below it is in view. The screen error is exact: both end points of the vertical difference are projected
@@ -74,14 +74,16 @@ pub struct Errors {
     pub off_axis_samples: [u64; ANGLES],
     /// Screen error divided by the view's tolerance, in the same bins.
     pub off_axis: [Summary; ANGLES],
-    /// Where the vertical error is largest; `None` if nothing is in view or nothing is wrong.
+    /// Place of the largest vertical error; `None` if nothing is in view or no error is above 0.
     pub vertical_at: Option<Place>,
-    /// Where the screen error is largest.
+    /// Place of the largest screen error.
     pub screen_at: Option<Place>,
 }
 
-/// Measures the triangles of a list; in a cave those that face down against its ceiling. Time is linear in triangles and samples; memory is bounded by a
-/// few thousandths of the field's samples for each of 64 pieces of work.
+/// Measures the triangles of a list; in a cave, those that face down against its ceiling.
+///
+/// Time is linear in triangles and samples. Memory is bounded by a few thousandths of the field's samples for each of 64
+/// parallel parts.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
     let ruler = Ruler::new(field, view, list.fraction_bits);
     let mut total = ruler.tallies();
@@ -89,7 +91,7 @@ pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) 
     total.errors(view.tolerance.px)
 }
 
-/// What is summed up.
+/// Sums over samples.
 struct Tallies {
     vertical: Tally,
     screen: Tally,
@@ -124,12 +126,12 @@ impl Tallies {
     }
 }
 
-/// What triangles are measured with.
+/// Data for measuring triangles.
 struct Ruler<'a> {
     field: &'a Field,
-    /// What triangles that face up are held against.
+    /// Reference for triangles that face up.
     floor: Truth<'a>,
-    /// What those that face down are, in a cave.
+    /// Reference for triangles that face down, in a cave.
     ceiling: Option<Truth<'a>>,
     tolerance_px: f64,
     fraction_bits: u32,
@@ -232,9 +234,10 @@ fn bounds(field: &Field, triangle: &Triangle, fraction_bits: u32) -> Aabb {
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
 }
 
-/// Whether the triangle is the one that counts a sample inside it or on its border: the one that holds the
-/// sample moved by (ε, ε²) for an infinitely small ε, towards the inside of the field. The triangle's corners have so many
-/// fraction bits.
+/// Returns true if a triangle counts a sample inside it or on its border.
+///
+/// Of all triangles around a sample, that one holds the sample moved by (ε, ε²) towards the inside of the field, for an
+/// infinitely small ε. Corners have `fraction_bits` fraction bits.
 pub(super) fn owns(triangle: &Triangle, fraction_bits: u32, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
     let towards = [if x < last[0] { 1 } else { -1 }, if z < last[1] { 1 } else { -1 }];
     let [a, b, c] = *triangle;

@@ -51,7 +51,7 @@ pub struct Mesh {
     pub tiles: [u32; 2],
 }
 
-/// Why there is no reference.
+/// Reason for a missing reference.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The error asked for, metres, cannot be one.
@@ -62,7 +62,7 @@ pub enum Error {
     Tile {
         /// The tile's first sample.
         at: [u32; 2],
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
 }
@@ -97,7 +97,7 @@ fn check(tolerance_m: f64) -> Result<(), Error> {
     if allowed { Ok(()) } else { Err(Error::Tolerance(tolerance_m)) }
 }
 
-/// Where a side of so many cells is cut: evenly, into pieces of at most [`TILE`].
+/// Returns the cuts of a side with this many cells: even pieces of at most [`TILE`] cells.
 fn seams(cells: u32) -> Vec<u32> {
     let pieces = cells.div_ceil(TILE);
     (0..=pieces).map(|k| (u64::from(cells) * u64::from(k) / u64::from(pieces)) as u32).collect()

@@ -3,7 +3,7 @@
 use crate::draw::expand::Drawn;
 use crate::height::surface::Triangle;
 
-/// What is wrong with a surface.
+/// Kind of fault of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// A corner lies outside the field.
@@ -16,7 +16,7 @@ pub enum Kind {
     Overlap,
     /// A vertex of one triangle lies inside an edge of another.
     TJunction,
-    /// Land with data, perhaps in sight, is not covered.
+    /// Terrain with data, perhaps in view, is not covered.
     Gap,
     /// One edge lies above another, and no skirt hides what is between them.
     Seam,
@@ -25,11 +25,11 @@ pub enum Kind {
 /// The fewest triangles that show what is wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CounterExample {
-    /// What is wrong.
+    /// Description of the fault.
     pub kind: Kind,
     /// The triangles at fault, as they were given; for a gap the samples' one that is missing.
     pub triangles: Vec<Triangle>,
-    /// What is wrong with them, and where.
+    /// Description of the fault and its place.
     pub text: String,
 }
 

@@ -12,8 +12,8 @@
 //! 5. m is 0 outside the field and changes across the border only. A sweep over the rows follows the border
 //!    and shows that m is 0 or 1 everywhere: covered once, and the drawn area is the covered area;
 //! 6. where m is 0, every triangle of the samples' own surface that has data is outside the frustum: nothing
-//!    in sight is left out. The test is [`Frustum::contains`] on the triangle's own box, so that whoever culls
-//!    by boxes around the land passes, and nobody passes who culls what can be seen.
+//!    in view is left out. The test is [`Frustum::contains`] on the triangle's own box: culling by boxes around the
+//!    terrain passes, and culling of anything visible does not.
 //!
 //! What lies along a culled region or a hole is thus no matter of the border's shape but of what is missing
 //! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
@@ -40,7 +40,7 @@ use crate::view::{Frustum, View};
 pub use self::counter_example::{CounterExample, Kind};
 use self::vertices::{faces_up, on_the_field, one_height_a_vertex};
 
-/// What was proven.
+/// Result of a proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proof {
     /// Triangles.
@@ -51,8 +51,7 @@ pub struct Proof {
     pub border_edges: usize,
 }
 
-/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 100 bytes a triangle
-/// while it runs.
+/// Proves that triangles are one surface that leaves out nothing in view. Needs about 100 bytes a triangle.
 ///
 /// # Panics
 /// If the field has more than 2^24 samples a side, or there are more than 2^31 triangles.
@@ -60,8 +59,8 @@ pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Pr
     prove_between(field, frustum, triangles, 0)
 }
 
-/// The same of triangles whose corners have so many fraction bits. Their border must consist of straight lines between
-/// samples, wherever on those lines its vertices lie.
+/// Proves the same of triangles whose corners have `fraction_bits` fraction bits. Their border must consist of straight
+/// lines between samples; vertices may lie anywhere on these lines.
 ///
 /// # Panics
 /// If there are more than 2^31 triangles, or more than 2^24 parts of samples a side.
@@ -100,7 +99,7 @@ fn one_surface(
 }
 
 /// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
-/// skirt; and that they leave out nothing in sight. `skirts` are upright triangles ([`expand::skirts`]).
+/// skirt; and that they leave out nothing in view. `skirts` are upright triangles ([`expand::skirts`]).
 ///
 /// # Panics
 /// As [`prove`].
@@ -147,7 +146,7 @@ pub fn prove_list(
     }
 }
 
-/// Writes triangles, whose corners have so many fraction bits, as ASCII PLY, world metres.
+/// Writes triangles, whose corners have `fraction_bits` fraction bits, as ASCII PLY, world metres.
 pub fn write_ply(field: &Field, triangles: &[Triangle], fraction_bits: u32, mut out: impl Write) -> io::Result<()> {
     writeln!(out, "ply\nformat ascii 1.0\ncomment metres: x east, y up, z south")?;
     writeln!(out, "element vertex {}", 3 * triangles.len())?;

@@ -25,7 +25,7 @@ type Heights = [f64; 2];
 #[derive(Clone, Copy)]
 struct Part {
     way: Way,
-    /// Whether the edge goes the other way.
+    /// True if the edge runs the other way.
     is_backward: bool,
     heights: Heights,
     triangle: u32,
