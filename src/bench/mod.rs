@@ -1,6 +1,6 @@
 //! Error against run time: named camera paths, cases run in turn in one process, and the comparison of two runs.
 //!
-//! Each row reaches the file as soon as it is measured. The driver needs no device: a [`BenchBackend`] draws.
+//! Rows reach the file one by one. The driver needs no device: a [`BenchBackend`] draws.
 
 pub mod compare;
 pub mod controller;
