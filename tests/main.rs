@@ -1,5 +1,6 @@
 //! All integration tests in one binary; the modules mirror `src/`.
 
+mod altered;
 mod architecture;
 mod bench;
 mod cli;

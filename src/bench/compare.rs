@@ -1,4 +1,4 @@
-//! What changed from one benchmark to another: times as ratios with intervals, counts and errors exactly.
+//! Comparison of two benchmarks: times as ratios with intervals, counts and errors exactly.
 //!
 //! Frames are held against each other as [`slowdown`] has it, over their floors: those tell how fast the machine was, and
 //! are compared by themselves, as they tell of shading too.
@@ -17,19 +17,19 @@ use super::rows::Errors;
 use super::slowdown::{Cost, MIN_ROUNDS, Pair, has_shading_only, slowdown};
 use super::statistics::Estimate;
 
-/// What is no regression yet: a tenth.
+/// Largest relative change that is no regression: a tenth.
 pub const THRESHOLD: f64 = 0.1;
 /// Share of intervals that may miss the truth, all of a kind together.
 const ALARM: f64 = 0.05;
 
-/// What changed.
+/// Changes between two benchmarks.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
     /// Cases that both have.
     pub matched: usize,
-    /// Whether both runs have rounds enough to judge times by.
+    /// True if both runs have enough rounds to judge times.
     pub is_judged: bool,
-    /// Whether times are over the floor's; milliseconds where one of the two has no floors.
+    /// True if times are divided by the shading-only times; else one of the runs has none, and times are milliseconds.
     pub over_shading_only: bool,
     /// Times of the floors, all cases together.
     pub shading_only: Option<Change>,
@@ -41,18 +41,18 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Cases that only one of the two has.
     pub unmatched: Vec<String>,
-    /// What is worse than the threshold allows, in words.
+    /// Regressions beyond the threshold, in words.
     pub regressions: Vec<String>,
 }
 
 /// The time of one thing in B over that in A.
 #[derive(Clone, Debug, Serialize)]
 pub struct Change {
-    /// What was timed.
+    /// Name of the timed case.
     pub what: String,
-    /// The ratio, its interval widened for the number of tests.
+    /// The ratio, with an interval corrected for the number of comparisons.
     pub ratio: Estimate,
-    /// Whether the whole interval lies above what is allowed.
+    /// True if the whole interval lies above the threshold.
     pub is_regression: bool,
 }
 
@@ -61,13 +61,13 @@ pub struct Change {
 pub struct Difference {
     /// The case.
     pub case: String,
-    /// Which value.
+    /// Name of the value.
     pub value: &'static str,
     /// In A.
     pub before: f64,
     /// In B.
     pub after: f64,
-    /// Whether it is worse by more than the threshold, or a promise that is no longer kept.
+    /// True if it is worse by more than the threshold, or a guarantee no longer holds.
     pub is_regression: bool,
 }
 
@@ -121,7 +121,7 @@ fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
 /// A value of the errors, and whether any growth of it breaks a promise.
 type Exact = (&'static str, fn(&Errors) -> Option<f64>, bool);
 
-/// What is compared exactly; larger is worse.
+/// Values compared exactly; larger is worse.
 const EXACT: &[Exact] = &[
     ("error_px.rms", |e| Some(e.error_px.rms), false),
     ("error_px.p999", |e| Some(e.error_px.p999), false),

@@ -1,16 +1,16 @@
-//! The laboratory that draws on a device: a technique's stage for each scene, and everything that is measured of its
-//! frames.
+//! The backend that draws on a device: a technique's renderer for each scene, and the measurements of its frames.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 
-use super::goal::ToleranceController;
+use super::controller::ToleranceController;
 use super::paths::TIME_STEP_S;
 use super::pool::Pool;
 use super::rows::{Case, Decision, Device, Errors, Plan, Terrain};
-use super::run::{BenchBackend, BenchScene, FrameSample, Timed};
+use super::run::{BenchBackend, BenchScene, Timed};
+use super::sample::FrameSample;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout;
 use crate::draw::{DrawList, Geometry};
@@ -46,7 +46,7 @@ impl DeviceBackend {
         plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
     }
 
-    /// A technique as it is when just made, and its stage.
+    /// A freshly prepared technique and its renderer.
     fn set(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
         let technique = build(scene.case, scene.field)?;
         let plan = self.plan(scene.field, technique.as_ref())?;
@@ -156,7 +156,7 @@ impl BenchBackend for DeviceBackend {
                 if let Some((from, resident, list)) = &before {
                     let old = pop::State { view: from, resident, list };
                     let new = pop::State { view, resident: technique.resident(), list: &renderer.list };
-                    pool.pop(&pop::pop(scene.field, old, new));
+                    pool.pop(pop::pop(scene.field, old, new));
                 }
             }
             // What the next frame is held against, if it is measured.
@@ -209,7 +209,7 @@ fn look(
     if renderer.list.pending > 0 {
         pool.pending(field, view, errors.screen_px.max, &depth);
     }
-    pool.economy(&economy::economy(field, view, resident, &renderer.list, &depth), fragments, covered);
+    pool.triangles(&economy::triangles(field, view, resident, &renderer.list, &depth), fragments, covered);
     pool.peers(field, view, &depth);
     pool.skirt_pixels(skirts(&picture).into_iter().filter(|&is| is).count());
     pool.picture(frame, &picture, &truth.picture)

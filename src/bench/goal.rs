@@ -1,20 +1,20 @@
-//! Holding a cost along a path: what a case asks for, the tolerance of each frame, and how well it was held.
+//! Goals: a cost to hold along a path, and the deviation from it.
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rows::Case;
-use super::run::FrameSample;
+use super::sample::FrameSample;
 use super::statistics::{Spread, middle};
-use crate::lod::budget::{Controller, RANGE_PX, Target};
-use crate::view::{Tolerance, View};
+use crate::lod::budget::Target;
+use crate::measure::extended;
 
 /// A frame whose cost is within this share of the target holds it.
 const BAND: f64 = 0.05;
 
-/// What every frame is to cost, by moving the tolerance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Cost that every frame is held at by moving the tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
     /// Triangles.
@@ -32,8 +32,8 @@ impl Goal {
         }
     }
 
-    /// What a frame cost, in the goal's unit.
-    fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
+    /// Returns the cost of a frame in the goal's unit.
+    pub(super) fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
         match self {
             Goal::Triangles(_) => triangles as f64,
             Goal::FrameMs(_) => frame_ms,
@@ -50,45 +50,21 @@ impl fmt::Display for Goal {
     }
 }
 
-/// Sets the tolerance of each frame of a flight: the case's own, or what holds its goal.
-pub struct ToleranceController {
-    tolerance: Tolerance,
-    budget: Option<(Goal, Controller)>,
-}
-
-impl ToleranceController {
-    /// Before the first frame.
-    pub fn new(case: &Case) -> Self {
-        let controller = |goal: Goal| (goal, Controller::new(goal.target(), case.tolerance_px, RANGE_PX));
-        Self { tolerance: case.tolerance(), budget: case.goal.map(controller) }
-    }
-
-    /// The next frame's view.
-    pub fn view(&self, view: &View) -> View {
-        let px = self.budget.as_ref().map_or(self.tolerance.px, |(_, controller)| controller.tolerance_px());
-        View { tolerance: Tolerance { px, ..self.tolerance }, ..*view }
-    }
-
-    /// Takes what a frame cost that was drawn for a view.
-    pub fn learn(&mut self, view: &View, triangles: u64, frame_ms: f64) {
-        if let Some((goal, controller)) = &mut self.budget {
-            controller.learn(view.tolerance.px, goal.cost(triangles, frame_ms));
-        }
-    }
-}
-
-/// How well a goal was held along a path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Deviation from a goal along a path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct BudgetStats {
     /// Share, 0 to 1, of the frames within 5 % of the goal.
+    #[schemars(range(max = 1.0))]
     pub within: f64,
     /// Frames before the first one within it.
     pub settling_frames: f64,
     /// Share, 0 to 1, of the frames from that one on that are within it; 0 if there is none.
+    #[schemars(range(max = 1.0))]
     pub settled: f64,
-    /// Most that a frame from that one on cost, over the goal.
+    /// Largest cost of a frame from that one on, divided by the goal.
     pub max: f64,
-    /// Tolerances used, pixels.
+    /// Tolerances of the frames, pixels.
     pub tolerance_px: Spread,
 }
 

@@ -60,7 +60,7 @@ impl Journal {
         written.with_context(|| self.name.clone())
     }
 
-    /// What the rows have in common.
+    /// Returns the header of the rows.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -97,7 +97,7 @@ fn row(line: &[u8]) -> serde_json::Result<Row> {
     serde_json::from_value(value)
 }
 
-/// What differs between two runs, so that their rows must not be mixed.
+/// Returns the first difference that forbids mixing the rows of two runs.
 fn difference(found: &Header, wanted: &Header) -> Option<String> {
     let told = |what: &str, a: &dyn std::fmt::Debug, b: &dyn std::fmt::Debug| {
         (format!("{a:?}") != format!("{b:?}")).then(|| format!("{what} is {a:?} and not {b:?}"))

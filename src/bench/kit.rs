@@ -25,7 +25,7 @@ pub struct KitScene {
     pub path: &'static str,
     /// Frames of the path.
     pub frames: usize,
-    /// Errors are measured at every so many frames.
+    /// Distance of the frames at which errors are measured.
     pub every: usize,
 }
 
@@ -101,7 +101,7 @@ mod tests {
         assert_eq!((WARM_UP, SIZE), (20, [1280, 720]));
     }
 
-    /// The list is what its version says: whoever changes a scene changes the version and this number with it.
+    /// A change of a scene needs another version, and this number changes with it.
     #[test]
     fn a_change_of_the_list_needs_another_version() {
         let text = format!("{SCENES:?} {WARM_UP} {SIZE:?} {REAL_PATHS:?}");

@@ -1,7 +1,9 @@
-//! Error against run time: named paths, cases run in turn in one process, rows that reach the file as they come,
-//! and what changed from one run to another. The driver knows no device: whoever draws is a [`BenchBackend`].
+//! Error against run time: named camera paths, cases run in turn in one process, and the comparison of two runs.
+//!
+//! Rows reach the file one by one. The driver needs no device: a [`BenchBackend`] draws.
 
 pub mod compare;
+pub mod controller;
 #[cfg(feature = "vulkan")]
 pub mod device;
 pub mod goal;
@@ -13,8 +15,10 @@ pub mod pool;
 pub mod results;
 pub mod rows;
 pub mod run;
+pub mod sample;
 pub mod slowdown;
 pub mod statistics;
 
 pub use rows::{Case, Errors, Header, Row, SCHEMA, Terrain, Times};
-pub use run::{BenchBackend, BenchScene, FrameSample, Timed};
+pub use run::{BenchBackend, BenchScene, Timed};
+pub use sample::FrameSample;

@@ -5,14 +5,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::goal::BudgetStats;
 use super::journal;
-use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, extended, kept};
+use super::rows::{Case, Errors, Header, Row, SCHEMA, Times, unscaled};
 use super::statistics::{Estimate, middle};
 use crate::height::save::replace;
+use crate::measure::extended::{self, Extended};
 use crate::renamed;
 
 /// Name of the file with everything.
@@ -20,32 +22,34 @@ pub const RESULTS: &str = "results.json";
 /// Name of the table with a line a case.
 pub const TABLE: &str = "results.csv";
 
-/// Everything a benchmark found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Results of a benchmark.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Results {
-    /// [`SCHEMA`].
+    /// Version of the format.
+    #[schemars(extend("const" = SCHEMA))]
     pub schema: u32,
-    /// What all cases have in common.
+    /// Properties that all cases share.
     pub header: Header,
-    /// Case by case, in the order in which they were first run.
+    /// The cases in the order of their first run.
     pub cases: Vec<CaseResult>,
 }
 
-/// What one case took and what was wrong with it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Times and errors of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseResult {
-    /// What was drawn and how.
+    /// The case.
     pub case: Case,
-    /// The rounds summed up; `None` if it was not timed.
+    /// Summary of its rounds; `None` if it was not timed.
     pub time: Option<TimeSummary>,
-    /// Its errors, if they were measured.
+    /// Its errors, if measured.
     pub errors: Option<Errors>,
-    /// Round by round.
+    /// Its rounds.
     pub rounds: Vec<Times>,
 }
 
-/// All rounds of a case. Each value is the median over the rounds of what a round says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Summary of a case's rounds. Each value is the median over the rounds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct TimeSummary {
     /// Median frame time, milliseconds, with its bootstrap 95 % interval.
     pub frame_ms: Estimate,
@@ -65,15 +69,15 @@ pub struct TimeSummary {
     pub upload_ms: Option<f64>,
     /// Median time of the same picture in one full-screen pass, milliseconds.
     pub shading_only_ms: Option<f64>,
-    /// Frame time over the floor's, pair by pair within a round.
+    /// Frame time divided by the shading-only time, round by round.
     pub over_shading_only: Option<Estimate>,
-    /// Frame time over the base case's of the same scene, pair by pair within a round.
+    /// Frame time divided by that of the base case of the same scene, round by round.
     pub over_base: Option<Estimate>,
-    /// Median of selection and recording together, milliseconds: what the host does of a frame.
+    /// Median of selection and recording together, the host's part of a frame, milliseconds.
     pub cpu_ms: Estimate,
-    /// The same over the base case's.
+    /// The same divided by that of the base case.
     pub cpu_over_base: Option<Estimate>,
-    /// Hitches in a hundred frames.
+    /// Share of hitches, percent.
     pub hitches_percent: f64,
     /// Mean triangles a frame.
     pub triangles: f64,
@@ -81,16 +85,16 @@ pub struct TimeSummary {
     pub draws: f64,
     /// Mean draw commands a frame.
     pub commands: f64,
-    /// What the tolerance was multiplied by because there was too much to draw, the most of any frame: 1 where it was
-    /// kept.
-    #[serde(with = "extended", default = "kept")]
+    /// Largest factor by which a frame's tolerance grew because its list did not fit the buffers: 1 if none did.
+    #[serde(with = "extended", default = "unscaled")]
+    #[schemars(with = "Extended", extend("minimum" = 1))]
     pub tolerance_scale: f64,
-    /// How well the goal was held, if there is one.
+    /// Deviation from the goal, if there is one.
     #[serde(default)]
     pub budget: Option<BudgetStats>,
     /// Device bytes, all purposes together.
     pub device_bytes: u64,
-    /// What the technique told of itself, by name.
+    /// Statistics of the technique, by name.
     #[serde(default)]
     pub stats: BTreeMap<String, f64>,
 }
@@ -128,7 +132,7 @@ impl Results {
 }
 
 impl CaseResult {
-    /// Whether land was missing where there is some: a crack or a hole.
+    /// Returns true if terrain was missing: a crack or a hole.
     pub fn is_torn(&self) -> bool {
         self.errors.as_ref().is_some_and(|e| e.watertight == Some(false) || e.hole_pixels.is_some_and(|n| n > 0))
     }
@@ -200,7 +204,7 @@ fn device_bytes(round: &Times) -> u64 {
     round.device_bytes.values().fold(0, |all, bytes| all.saturating_add(*bytes))
 }
 
-/// What is looked at in a round, milliseconds.
+/// A time of a round, milliseconds.
 type Cost = fn(&Times) -> f64;
 
 fn frame_ms(round: &Times) -> f64 {

@@ -1,6 +1,7 @@
-//! The driver: which case is drawn when, and what becomes of it. Cases of one scene take turns within a round
-//! (A B A B …), so that what slows the machine down for a while slows all of them; the frames before the path begins
-//! are dropped; every row is on the disk before the next is begun.
+//! The driver of a benchmark.
+//!
+//! Cases of one scene take turns within a round (A B A B …), so that a temporary slowdown of the machine affects all of
+//! them. Warm-up frames are dropped. Every row is on the disk before the next one starts.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,73 +16,44 @@ use super::machine::host_bytes;
 use super::paths::{self, Pose};
 use super::results;
 use super::rows::{Case, Device, ErrorRow, Errors, Header, Plan, Row, Terrain, TimeRow, Times};
+use super::sample::FrameSample;
 use super::statistics::{Percentiles, Spread};
 use crate::height::Field;
 use crate::view::{Metric, Tolerance, View};
 
-/// A frame of more than so many medians is a hitch.
+/// A frame longer than this many medians is a hitch.
 const HITCH: f64 = 2.0;
 
-/// One case as a laboratory gets it.
+/// One case, as given to a backend.
 pub struct BenchScene<'a> {
-    /// What is drawn and how.
+    /// The case.
     pub case: &'a Case,
     /// The field.
     pub field: &'a Arc<Field>,
-    /// A view a frame, in order, under the case's tolerance; a goal moves it ([`ToleranceController`](super::held::Helm)).
+    /// One view a frame, in order, with the case's tolerance. A goal moves it
+    /// ([`ToleranceController`](super::controller::ToleranceController)).
     pub views: &'a [View],
     /// The folder for pictures: file names in [`Errors`] are relative to it.
     pub folder: &'a Path,
 }
 
-/// What one frame took.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameSample {
-    /// From the start of selection until the picture is done, milliseconds.
-    pub frame_ms: f64,
-    /// Selection, milliseconds.
-    pub select_ms: f64,
-    /// Recording of commands, milliseconds.
-    pub record_ms: f64,
-    /// The device, milliseconds.
-    pub gpu_ms: Option<f64>,
-    /// Copying to the device, milliseconds.
-    pub upload_ms: Option<f64>,
-    /// The same pose with the same fragment work in one full-screen pass, milliseconds.
-    pub shading_only_ms: Option<f64>,
-    /// Triangles drawn.
-    pub triangles: u64,
-    /// Vertices run.
-    pub vertices: Option<u64>,
-    /// Draws of the list.
-    pub draws: u64,
-    /// Draw commands recorded.
-    pub commands: u64,
-    /// What the tolerance was multiplied by: 1 where it was kept.
-    pub tolerance_scale: f64,
-    /// Instances in sight whose refinement waited.
-    pub pending: u64,
-    /// Error allowed, pixels.
-    pub tolerance_px: f64,
-}
-
-/// What drawing a scene once took.
+/// Measurements of one pass along a path.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timed {
     /// One a view.
     pub frames: Vec<FrameSample>,
     /// Device bytes by purpose, the most of any frame.
     pub device_bytes: BTreeMap<String, u64>,
-    /// What the technique tells of itself at the end, by name.
+    /// Statistics of the technique after the last frame, by name.
     pub stats: BTreeMap<String, f64>,
 }
 
-/// Whoever draws. A laboratory may keep what it made for a scene; it is called for the scenes in turn.
+/// A renderer to be measured. It is called for the scenes in turn and may keep data between calls.
 pub trait BenchBackend {
     /// The device, and the plan of each terrain's scene.
     fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)>;
 
-    /// Draws every view once, in order, beginning with the technique as it is when it has just been made.
+    /// Draws every view once, in order, starting with a freshly prepared technique.
     fn time(&mut self, scene: &BenchScene) -> Result<Timed>;
 
     /// Draws every view once, in order, and measures the frames 0, [`Case::every`], 2 · [`Case::every`], …
@@ -93,15 +65,15 @@ pub trait BenchBackend {
     }
 }
 
-/// What is to be run.
+/// Cases to run, and how.
 pub struct Run<'a> {
-    /// Where rows, results and pictures go.
+    /// Directory for rows, results and pictures.
     pub folder: &'a Path,
     /// The cases; those of one scene stand in the order in which they take turns.
     pub cases: Vec<Case>,
     /// The fields of the cases.
     pub fields: Vec<(Terrain, Arc<Field>)>,
-    /// How often each case is timed.
+    /// Number of rounds of each case.
     pub rounds: usize,
     /// Frames drawn before the path begins, from its first pose.
     pub warm_up: usize,
@@ -109,20 +81,20 @@ pub struct Run<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Where a run is.
+/// Progress of a run.
 pub struct Step<'a> {
     /// Rows written, and rows of the whole run.
     pub done: [usize; 2],
-    /// What comes next.
+    /// The case that comes next.
     pub case: &'a Case,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// Every row is there.
     Complete,
-    /// It was stopped; the same command goes on.
+    /// Stopped early; the same command resumes it.
     Stopped,
 }
 
@@ -169,7 +141,7 @@ impl Run<'_> {
         Ok(Ended::Complete)
     }
 
-    /// What a failure does not take away.
+    /// Rows and results stay valid if a row fails.
     fn kept(&self, journal: &Journal) -> String {
         let rows = journal.rows().len();
         format!("{}: {rows} rows are kept, the same command goes on there", self.folder.display())

@@ -1,4 +1,4 @@
-//! How many times as long one run took as another, frame by frame.
+//! Ratio of two runs' times, frame by frame.
 //!
 //! What disturbs a frame only ever adds to its time: of a frame's times over the rounds the shortest is nearest to the
 //! truth (Chen, Revels 2016, "Robust benchmarking in noisy environments"). It is held against the other run's shortest
@@ -17,7 +17,7 @@ pub const MIN_ROUNDS: usize = 3;
 /// One case in both runs.
 pub type Pair<'a> = (&'a CaseResult, &'a CaseResult);
 
-/// What is looked at in a frame.
+/// A time of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
     /// Its time.
@@ -28,7 +28,7 @@ pub enum Cost {
     OverShadingOnly,
 }
 
-/// Whether the rounds of a case have a floor for every frame.
+/// Returns true if every round of a case has a shading-only time for every frame.
 pub fn has_shading_only(case: &CaseResult) -> bool {
     case.rounds
         .iter()

@@ -1,6 +1,9 @@
 //! Statistics of noisy times: medians and percentiles by rank, bootstrap intervals of medians. Deterministic.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::measure::extended;
 
 /// Draws of a bootstrap.
 const RESAMPLES: usize = 4000;
@@ -8,7 +11,8 @@ const RESAMPLES: usize = 4000;
 pub const CONFIDENCE: f64 = 0.95;
 
 /// Values that half, 95 % and 99 % do not exceed, and the largest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct Percentiles {
     /// Median.
     pub p50: f64,
@@ -21,7 +25,8 @@ pub struct Percentiles {
 }
 
 /// Mean and largest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct Spread {
     /// Mean.
     pub mean: f64,
@@ -30,7 +35,8 @@ pub struct Spread {
 }
 
 /// A value and the interval that holds it with a given confidence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct Estimate {
     /// The value.
     pub value: f64,

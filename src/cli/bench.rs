@@ -8,9 +8,10 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
-use super::cases::{Choice, Planned};
-use super::scene::{GroundArgs, ReadArgs, size};
-use super::{Common, Outcome, interrupt, report};
+pub use super::cases::MeasureArgs;
+use super::cases::Planned;
+use super::common::{Common, Outcome};
+use super::{interrupt, report};
 use crate::bench::compare::{THRESHOLD, compare};
 use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
@@ -47,62 +48,6 @@ pub struct CompareArgs {
     /// What is no regression yet: 0.1 is a tenth.
     #[arg(long, value_name = "SHARE", default_value_t = THRESHOLD)]
     pub threshold: f64,
-}
-
-/// What is measured.
-#[derive(Args, Debug)]
-pub struct MeasureArgs {
-    /// Height files of any supported format, directories of web-map tiles, `demo`.
-    #[arg(required_unless_present = "kit")]
-    pub terrain: Vec<String>,
-    /// How they are read.
-    #[command(flatten)]
-    pub reading: ReadArgs,
-    /// Directory for rows, results, pictures and the report; a run that was stopped goes on.
-    #[arg(long, value_name = "DIR", required = true)]
-    pub out: Option<PathBuf>,
-    /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
-    #[arg(long, value_name = "T,…", value_delimiter = ',')]
-    pub technique: Vec<String>,
-    /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
-    #[arg(long = "set", value_name = "KEY=V,…", value_parser = super::scene::key_value)]
-    pub settings: Vec<(String, String)>,
-    /// Errors allowed, pixels.
-    #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
-    pub tolerance: Vec<f64>,
-    /// Triangles a frame to hold by moving the tolerance, which starts as the first one given; each is measured.
-    #[arg(long, value_name = "N,…", value_delimiter = ',')]
-    pub triangles: Vec<f64>,
-    /// Milliseconds a frame to hold in the same way.
-    #[arg(long, value_name = "MS,…", value_delimiter = ',')]
-    pub frame_time: Vec<f64>,
-    /// Paths to fly; the kit has its own.
-    #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = super::cases::path_help())]
-    pub path: Vec<String>,
-    /// The meaning of a pixel of error.
-    #[arg(long, value_enum, default_value_t = Choice::Certified)]
-    pub metric: Choice,
-    /// Pixels; the kit has its own.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
-    pub size: [u32; 2],
-    /// Frames of a path; the kit has its own.
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub frames: u32,
-    /// How often each case is timed.
-    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub rounds: u32,
-    /// What the ground is like from near, and a sun that moves.
-    #[command(flatten)]
-    pub ground: GroundArgs,
-    /// The public benchmark kit; terrains that are given join it.
-    #[arg(long)]
-    pub kit: bool,
-    /// Of the kit, only the scenes whose name contains one of these, as in "peers-1 2049".
-    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
-    pub only: Vec<String>,
-    /// A quarter of the frames and two rounds: to see that all works, not to quote.
-    #[arg(long)]
-    pub quick: bool,
 }
 
 #[derive(Serialize)]

@@ -1,14 +1,15 @@
 //! What `cuesta bench` was asked for, turned into fields and cases.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Result, anyhow, bail, ensure};
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 
-use super::bench::MeasureArgs;
-use super::{Common, endless, report};
+use super::common::Common;
+use super::scene::{GroundArgs, ReadArgs, key_value, size};
+use super::{endless, report};
 use crate::bench::goal::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
@@ -20,6 +21,62 @@ const WARM_UP: usize = 5;
 const MEASURED: usize = 12;
 /// The technique that draws every sample in every view, whatever the tolerance.
 const TRUTH: &str = "brute-force";
+
+/// What is measured.
+#[derive(Args, Debug)]
+pub struct MeasureArgs {
+    /// Height files of any supported format, directories of web-map tiles, `demo`.
+    #[arg(required_unless_present = "kit")]
+    pub terrain: Vec<String>,
+    /// How they are read.
+    #[command(flatten)]
+    pub reading: ReadArgs,
+    /// Directory for rows, results, pictures and the report; a run that was stopped goes on.
+    #[arg(long, value_name = "DIR", required = true)]
+    pub out: Option<PathBuf>,
+    /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
+    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    pub technique: Vec<String>,
+    /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
+    #[arg(long = "set", value_name = "KEY=V,…", value_parser = key_value)]
+    pub settings: Vec<(String, String)>,
+    /// Errors allowed, pixels.
+    #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
+    pub tolerance: Vec<f64>,
+    /// Triangles a frame to hold by moving the tolerance, which starts as the first one given; each is measured.
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    pub triangles: Vec<f64>,
+    /// Milliseconds a frame to hold in the same way.
+    #[arg(long, value_name = "MS,…", value_delimiter = ',')]
+    pub frame_time: Vec<f64>,
+    /// Paths to fly; the kit has its own.
+    #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = path_help())]
+    pub path: Vec<String>,
+    /// The meaning of a pixel of error.
+    #[arg(long, value_enum, default_value_t = Choice::Certified)]
+    pub metric: Choice,
+    /// Pixels; the kit has its own.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub size: [u32; 2],
+    /// Frames of a path; the kit has its own.
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// How often each case is timed.
+    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub rounds: u32,
+    /// What the ground is like from near, and a sun that moves.
+    #[command(flatten)]
+    pub ground: GroundArgs,
+    /// The public benchmark kit; terrains that are given join it.
+    #[arg(long)]
+    pub kit: bool,
+    /// Of the kit, only the scenes whose name contains one of these, as in "peers-1 2049".
+    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
+    pub only: Vec<String>,
+    /// A quarter of the frames and two rounds: to see that all works, not to quote.
+    #[arg(long)]
+    pub quick: bool,
+}
 
 /// Which metrics are measured.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]

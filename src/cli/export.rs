@@ -11,9 +11,10 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::json;
 
+use super::common::{Common, Outcome};
+use super::report;
 use super::scene::{TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
-use super::{Common, Outcome, report};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
 use crate::height::save::{Out, replace};

@@ -1,48 +1,14 @@
 //! `cuesta info`: what was read; the scene plan; the devices.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use clap::Args;
 use serde::Serialize;
 
-use super::scene::{LookArgs, ReadArgs, ViewArgs};
-use super::technique::TechniqueArgs;
-use super::{Common, Outcome, plan, report, working_set};
+use super::common::{Common, Outcome};
+pub use super::info_args::InfoArgs;
+use super::{plan, report, working_set};
 use crate::height::{Loaded, SourceFile};
-
-/// Arguments.
-#[derive(Args, Debug)]
-pub struct InfoArgs {
-    /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; or `demo`.
-    #[arg(required_unless_present = "devices")]
-    pub terrain: Vec<String>,
-    /// How heights are read.
-    #[command(flatten)]
-    pub reading: ReadArgs,
-    /// What this scene needs on the device, and what it leaves out.
-    #[arg(long, requires = "terrain")]
-    pub plan: bool,
-    /// Also how much each feature that is left out would take: each is kept once, for so many frames of the view.
-    #[arg(long, value_name = "FRAMES", requires = "plan", num_args = 0..=1, default_missing_value = "30")]
-    pub measure: Option<usize>,
-    /// Draws which nodes of a map of 2^36 texels over the field the view needs, and how fine: a .png.
-    #[arg(long, value_name = "FILE", requires = "terrain", conflicts_with = "plan")]
-    pub working_set: Option<PathBuf>,
-    /// The view that is needed for.
-    #[command(flatten)]
-    pub view: ViewArgs,
-    /// Vulkan devices, and what is missing on each.
-    #[arg(long)]
-    pub devices: bool,
-    /// The technique planned for.
-    #[command(flatten)]
-    pub technique: TechniqueArgs,
-    /// The look planned for.
-    #[command(flatten)]
-    pub look: LookArgs,
-}
 
 /// What was read.
 #[derive(Serialize)]

@@ -2,9 +2,11 @@
 
 pub mod bench;
 pub mod cases;
+pub mod common;
 pub mod endless;
 pub mod export;
 pub mod info;
+pub mod info_args;
 pub mod interrupt;
 pub mod numbers;
 pub mod overlay;
@@ -30,7 +32,9 @@ use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
 use anyhow::{Result, anyhow};
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+pub use common::{Common, Outcome};
 
 /// Large terrain drawn with a bounded error.
 #[derive(Parser, Debug)]
@@ -42,29 +46,6 @@ pub struct Cli {
     /// The subcommand; without one, `view demo` on a display and `render demo -o cuesta.png` elsewhere.
     #[command(subcommand)]
     pub command: Option<Command>,
-}
-
-/// What every subcommand takes.
-#[derive(Args, Debug, Clone, Default)]
-pub struct Common {
-    /// One JSON document on stdout and nothing else there.
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Say only what was asked for.
-    #[arg(long, global = true)]
-    pub quiet: bool,
-    /// Vulkan device: part of its name, or `cpu` for a software device.
-    #[arg(long, global = true, value_name = "NAME")]
-    pub device: Option<String>,
-    /// Validation layers on; any message makes the exit code 1.
-    #[arg(long, global = true)]
-    pub validate: bool,
-    /// Device memory is out after so many allocations: to try what happens then.
-    #[arg(long, global = true, value_name = "N")]
-    pub allocations: Option<u64>,
-    /// The device is lost after so many calls that would notice: to try what happens then.
-    #[arg(long, global = true, value_name = "N")]
-    pub lose_device: Option<u64>,
 }
 
 /// The subcommands.
@@ -100,15 +81,6 @@ impl Cli {
         let matches = command.try_get_matches_from_mut(words)?;
         Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
     }
-}
-
-/// How a run ended, if it did not fail.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Everything asked for was done: exit code 0.
-    Done,
-    /// A limit was missed — a crack, an error, a validation message — or not all was tried: exit code 1.
-    LimitMissed,
 }
 
 /// Parses the command line and runs it. Failures and wrong use are one line on stderr and exit code 2.

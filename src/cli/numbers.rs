@@ -6,6 +6,18 @@ use clap::{Arg, Command};
 
 use crate::height;
 
+/// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
+/// a tenth of a millimetre.
+pub(super) const FARTHEST_M: f64 = 1e12;
+/// The shortest that is asked for, metres, and the finest tolerance, pixels.
+pub(super) const FINEST: f64 = 1e-9;
+/// What [`is_length`] takes.
+pub(super) const LENGTHS: &str = "1e-9 to 1e12 metres";
+
+pub(super) fn is_length(metres: f64) -> bool {
+    (FINEST..=FARTHEST_M).contains(&metres)
+}
+
 /// The same command whose flags for numbers take ones that begin with a minus, in any notation.
 pub fn with_negative(command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|command| command.get_name().to_string()).collect();
@@ -49,6 +61,6 @@ pub(super) fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Resul
 pub(super) fn spacing(text: &str) -> Result<[f64; 2], String> {
     let pair = numbers::<f64, 2>(text).map(|[x, z]| [x, z.abs()]);
     let pair = pair.or_else(|_| numbers::<f64, 1>(text).map(|[s]| [s, s]))?;
-    let is_length = pair.iter().all(|&s| super::scene::is_length(s));
-    if is_length { Ok(pair) } else { Err(format!("expected {}", super::scene::LENGTHS)) }
+    let is_length = pair.iter().all(|&s| is_length(s));
+    if is_length { Ok(pair) } else { Err(format!("expected {}", LENGTHS)) }
 }

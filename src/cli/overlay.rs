@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::ImageDecoder;
 
-use super::{Common, report};
+use super::common::Common;
+use super::report;
 use crate::height::{Error, Field, Footprint, Located, Place, demo, place_of};
 use crate::texture::drape::Drape;
 

@@ -7,8 +7,9 @@ use anyhow::Result;
 use anyhow::bail;
 use serde::Serialize;
 
-use super::info::InfoArgs;
-use super::{Common, Outcome, report};
+use super::common::{Common, Outcome};
+use super::info_args::InfoArgs;
+use super::report;
 use crate::height::{Field, Loaded};
 use crate::lod::Technique;
 use crate::plan::{Decision, Look, ScenePlan};

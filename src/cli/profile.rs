@@ -7,10 +7,11 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 
+use super::common::{Common, Outcome};
 use super::render::open;
 use super::scene::{LookArgs, TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
-use super::{Common, Outcome, endless, report};
+use super::{endless, report};
 use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;
 use crate::height::{Field, Loaded};

@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 
-use super::{Common, Outcome, report};
+use super::common::{Common, Outcome};
+use super::report;
 use crate::bench::results;
 use crate::stress::rows;
 

@@ -8,17 +8,17 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use serde::Serialize;
 
+use super::common::{Common, Outcome};
 use super::scene::{LookArgs, TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
-use super::{Common, Outcome, endless, report};
-use crate::bench::rows::extended;
+use super::{endless, report};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
 use crate::gpu::{Choice, Gpu, Instance};
 use crate::height::{Error, Loaded};
 use crate::lod::Technique;
-use crate::measure::geometric::{self, Summary};
-use crate::measure::watertight;
+use crate::measure::summary::Summary;
+use crate::measure::{extended, geometric, watertight};
 use crate::plan::ScenePlan;
 use crate::scene::holes::{Truth, skirts};
 use crate::scene::{RenderResult, Scene};
@@ -85,8 +85,8 @@ struct Rendered {
 
 #[derive(Serialize)]
 struct Measured {
-    error_px: Statistics,
-    error_m: Statistics,
+    error_px: Summary,
+    error_m: Summary,
     hole_pixels: usize,
     /// The first few, from the top left corner.
     hole_pixels_at: Vec<[usize; 2]>,
@@ -96,19 +96,6 @@ struct Measured {
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     counter_example: Option<String>,
-}
-
-#[derive(Serialize)]
-struct Statistics {
-    rms: f64,
-    p999: f64,
-    max: f64,
-}
-
-impl From<Summary> for Statistics {
-    fn from(s: Summary) -> Self {
-        Self { rms: s.rms, p999: s.p999, max: s.max }
-    }
 }
 
 /// The device that the command line asks for.

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Common;
+use super::common::Common;
 use crate::height::Error;
 use crate::height::progress::Progress;
 use crate::height::save::replace;

@@ -7,21 +7,17 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
-use super::numbers::{nodata, numbers, spacing};
+use super::common::Common;
+use super::numbers::{FARTHEST_M, LENGTHS, is_length, nodata, numbers, spacing};
 use super::overlay::Picture;
+use super::several::is_demo;
 use super::whole::Whole;
-use super::{Common, endless, report, several};
+use super::{endless, report, several};
 use crate::height::cave::Cave;
 use crate::height::{Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLayout, demo, load_all, load_bytes};
 
 use crate::plan::{Colour, Forced, Look};
 use crate::view::{Lens, Tolerance, View, default_near};
-
-/// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
-/// a tenth of a millimetre.
-const FARTHEST_M: f64 = 1e12;
-/// The shortest that is asked for, metres, and the finest tolerance, pixels.
-pub(super) const FINEST: f64 = 1e-9;
 
 /// Where heights come from.
 #[derive(Args, Debug, Clone)]
@@ -185,13 +181,6 @@ impl ValueEnum for Colour {
     }
 }
 
-/// What [`is_length`] takes.
-pub(super) const LENGTHS: &str = "1e-9 to 1e12 metres";
-
-pub(super) fn is_length(metres: f64) -> bool {
-    (FINEST..=FARTHEST_M).contains(&metres)
-}
-
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let pair = numbers::<u32, 2>(&text.replace('x', ","));
     pair.ok().filter(|s| s.iter().all(|&n| n > 0)).ok_or_else(|| "expected WxH, as in 1280x720".to_string())
@@ -273,11 +262,6 @@ impl TerrainArgs {
     pub fn name(&self) -> String {
         self.terrain.join(" ")
     }
-}
-
-/// Whether it is the embedded terrain, which has an overlay of its own.
-pub(super) fn is_demo(terrain: &str) -> bool {
-    terrain == "demo" && !Path::new(terrain).exists()
 }
 
 /// What the embedded picture's pixels mean, unless the user says otherwise.

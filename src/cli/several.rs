@@ -1,15 +1,17 @@
 //! Several files and folders named as one terrain.
 
+use std::path::Path;
+
 use anyhow::{Result, bail};
 
-use super::{endless, scene};
+use super::endless;
 
 /// The one name, if it is one; several are files and folders.
 pub fn only(terrain: &[String]) -> Result<Option<&str>> {
     if let [only] = terrain {
         return Ok(Some(only));
     }
-    match terrain.iter().find(|name| scene::is_demo(name) || endless::is_named(name)) {
+    match terrain.iter().find(|name| is_demo(name) || endless::is_named(name)) {
         Some(name) => bail!("{name}: expected files and folders where several terrains are one field"),
         None => Ok(None),
     }
@@ -22,4 +24,9 @@ pub fn cache_path(terrain: &[String]) -> String {
         [first, rest @ ..] => format!("{first}+{}", rest.len()),
         [] => String::new(),
     }
+}
+
+/// Whether it is the embedded terrain, which has an overlay of its own.
+pub(super) fn is_demo(terrain: &str) -> bool {
+    terrain == "demo" && !Path::new(terrain).exists()
 }

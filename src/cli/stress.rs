@@ -6,7 +6,8 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::{Common, Outcome, interrupt, report};
+use super::common::{Common, Outcome};
+use super::{interrupt, report};
 use crate::height::save::replace;
 use crate::stress::{
     self, Case, CaseRun, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, jitter, rows, saved, stiff,

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 
+use super::common::{Common, Outcome};
 use super::info::Info;
-use super::{Common, Outcome, report};
+use super::report;
 use crate::height::synth::{self, Kind};
 use crate::height::{Footprint, Loaded, Samples, save};
 

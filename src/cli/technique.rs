@@ -5,8 +5,10 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 
-use super::scene::{FINEST, key_value};
-use super::{Common, report};
+use super::common::Common;
+use super::numbers::FINEST;
+use super::report;
+use super::scene::key_value;
 use crate::height::Field;
 use crate::lod::{self, Settings, Technique};
 use crate::view::{Metric, Tolerance};

@@ -6,9 +6,10 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::common::{Common, Outcome};
 use super::scene::{LookArgs, TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
-use super::{Common, Outcome, interrupt, render, report};
+use super::{interrupt, render, report};
 use crate::height::Loaded;
 use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;

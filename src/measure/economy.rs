@@ -1,12 +1,14 @@
-//! What triangles cost: how many there are, how many of them show, and how large they are on the screen.
+//! Cost of triangles: their number, how many of them show, and their size on the screen.
 //!
-//! A triangle's size is the exact area of its projection, clipped to the picture; what other land hides of it
-//! is not taken off. Those that other land hides are counted apart ([`Depths`]).
+//! A triangle's size is the exact area of its projection, clipped to the picture. Parts hidden by other terrain are not
+//! subtracted; triangles hidden as a whole are counted ([`Depths`]).
 
 use glam::DVec4;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::each_part;
+use super::extended;
 use super::hidden::Depths;
 use super::histogram::Histogram;
 use crate::draw::expand;
@@ -19,68 +21,99 @@ use crate::view::View;
 /// Powers of two, px², between which the histogram has its bins: from 1/256 px² to more than any picture has.
 const BINS: [i32; 2] = [-8, 24];
 
-/// The triangles of a list in a view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Share of triangles that are small or hidden, and of fragments that are drawn over.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
 pub struct Economy {
-    /// Triangles submitted.
-    pub triangles: u64,
-    /// Of these, those without area in plan.
-    pub degenerate: u64,
-    /// Those wholly outside the picture.
-    pub outside: u64,
-    /// Those at least partly in the picture that face away from the eye or are seen edge-on.
-    pub facing_away: u64,
-    /// The rest: at least partly in the picture, facing the eye.
-    pub shown: u64,
-    /// Of the shown, those that land in front hides.
-    pub hidden: u64,
-    /// Of the shown, the share with less than 1 px² in the picture; 0 if none is shown.
-    pub sub_pixel_share: f64,
-    /// Area of all shown triangles in the picture, pixels.
-    pub area_px: f64,
-    /// The shown triangles by their area in the picture, pixels: bins from 2^−8 to 2^24.
-    pub sizes_px: Histogram,
-}
-
-/// Fragments for each covered pixel, given how many the device ran and how many pixels they cover; `None` if no
-/// pixel is covered.
-pub fn overdraw(fragments: u64, covered_pixels: u64) -> Option<f64> {
-    (covered_pixels > 0).then(|| fragments as f64 / covered_pixels as f64)
-}
-
-/// Measures the triangles of a list; `depth` is what it left when it was drawn, one a pixel.
-pub fn economy(field: &Field, view: &View, resident: &Geometry, list: &DrawList, depth: &[f32]) -> Economy {
-    let screen = Screen::new(field, view, depth);
-    let mut total = Economy::new();
-    each_part(list, |part| screen.part(resident, list, part), |part| total.merge(&part));
-    total.triangles = list.triangles();
-    total.degenerate = total.triangles - total.outside - total.facing_away - total.shown;
-    let sub_pixel: u64 = (0..).zip(&total.sizes_px.counts).filter(|&(k, _)| total.is_sub_pixel(k)).map(|b| b.1).sum();
-    total.sub_pixel_share = sub_pixel as f64 / total.shown.max(1) as f64;
-    total
+    /// Triangles in view by their area, pixels.
+    pub pixels_per_triangle: Histogram,
+    /// Share of the triangles in view that terrain in front hides, 0 to 1.
+    #[serde(default)]
+    pub hidden_share: f64,
+    /// Share of the triangles in view that are smaller than one pixel, 0 to 1.
+    pub subpixel_share: f64,
+    /// Fragments run per covered pixel, by the driver's counters. Software devices count whole blocks of pixels.
+    pub overdraw: Option<f64>,
+    /// Fragments that passed the depth test per covered pixel: 1 if nothing is drawn over.
+    #[serde(default)]
+    pub passed: Option<f64>,
 }
 
 impl Economy {
-    fn new() -> Self {
+    /// Returns the shares of these triangles.
+    ///
+    /// `fragments` are those run and those that passed the depth test, `None` where the device does not count them.
+    /// `covered` is the number of pixels that they cover.
+    pub fn new(triangles: &Triangles, fragments: [Option<u64>; 2], covered: u64) -> Self {
+        let share = |count: u64| count as f64 / triangles.shown.max(1) as f64;
+        let per_pixel = |fragments: u64| (covered > 0).then(|| fragments as f64 / covered as f64);
+        let [overdraw, passed] = fragments.map(|count| count.and_then(per_pixel));
         Self {
-            triangles: 0,
+            pixels_per_triangle: triangles.sizes_px.clone(),
+            hidden_share: share(triangles.hidden),
+            subpixel_share: share(triangles.sub_pixel()),
+            overdraw,
+            passed,
+        }
+    }
+}
+
+/// Counts of the triangles of one or several frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triangles {
+    /// Triangles submitted.
+    pub submitted: u64,
+    /// Of these, triangles without area in plan.
+    pub degenerate: u64,
+    /// Triangles wholly outside the picture.
+    pub outside: u64,
+    /// Triangles at least partly in the picture that face away from the eye or are seen edge-on.
+    pub facing_away: u64,
+    /// Triangles at least partly in the picture that face the eye.
+    pub shown: u64,
+    /// Of the shown, triangles that terrain in front hides.
+    pub hidden: u64,
+    /// Area of all shown triangles in the picture, pixels.
+    pub area_px: f64,
+    /// The shown triangles by their area in the picture, pixels: bin ends from 2^−8 to 2^24.
+    pub sizes_px: Histogram,
+}
+
+/// Measures the triangles of a list. `depth` is the depth buffer after drawing it, one value a pixel.
+pub fn triangles(field: &Field, view: &View, resident: &Geometry, list: &DrawList, depth: &[f32]) -> Triangles {
+    let screen = Screen::new(field, view, depth);
+    let mut total = Triangles::default();
+    each_part(list, |part| screen.part(resident, list, part), |part| total.merge(&part));
+    total.submitted = list.triangles();
+    total.degenerate = total.submitted - total.outside - total.facing_away - total.shown;
+    total
+}
+
+impl Default for Triangles {
+    fn default() -> Self {
+        Self {
+            submitted: 0,
             degenerate: 0,
             outside: 0,
             facing_away: 0,
             shown: 0,
             hidden: 0,
-            sub_pixel_share: 0.0,
             area_px: 0.0,
             sizes_px: Histogram::new(BINS[0], BINS[1]),
         }
     }
+}
 
-    /// Whether a bin of sizes ends at 1 px² or below.
-    fn is_sub_pixel(&self, bin: usize) -> bool {
-        self.sizes_px.begin(bin) < 1.0
+impl Triangles {
+    /// Returns the number of shown triangles smaller than 1 px².
+    pub fn sub_pixel(&self) -> u64 {
+        self.sizes_px.bins.iter().filter(|bin| bin.from < 1.0).map(|bin| bin.count).sum()
     }
 
-    fn merge(&mut self, part: &Economy) {
+    /// Adds the counts of another frame.
+    pub fn merge(&mut self, part: &Triangles) {
+        self.submitted += part.submitted;
+        self.degenerate += part.degenerate;
         self.outside += part.outside;
         self.facing_away += part.facing_away;
         self.shown += part.shown;
@@ -89,7 +122,7 @@ impl Economy {
         self.sizes_px.merge(&part.sizes_px);
     }
 
-    /// Counts a triangle by its signed area in the picture and whether it is hidden; `None` if it has no part in it.
+    /// Counts a triangle by its signed area in the picture and its visibility; `None` if it lies outside.
     fn add(&mut self, seen: Option<(f64, bool)>) {
         match seen {
             None => self.outside += 1,
@@ -104,7 +137,7 @@ impl Economy {
     }
 }
 
-/// What triangles are projected with.
+/// Data for projecting triangles.
 struct Screen<'a> {
     field: &'a Field,
     view: &'a View,
@@ -119,15 +152,15 @@ impl<'a> Screen<'a> {
         Self { field, view, frame, depths: Depths { size: view.size, values: depth }, clip_from_relative }
     }
 
-    fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Economy {
-        let mut economy = Economy::new();
+    fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Triangles {
+        let mut found = Triangles::default();
         expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle| {
-            economy.add(self.seen(&triangle.corners, list.fraction_bits));
+            found.add(self.seen(&triangle.corners, list.fraction_bits));
         });
-        economy
+        found
     }
 
-    /// The area, pixels, that a triangle has in the picture, negative if it faces away, and whether it is hidden;
+    /// Returns the area of a triangle in the picture, pixels, negative if it faces away, and true if it is hidden.
     /// `None` if it lies outside.
     fn seen(&self, triangle: &Triangle, fraction_bits: u32) -> Option<(f64, bool)> {
         let corners = triangle.each_ref().map(|corner| {
@@ -140,7 +173,8 @@ impl<'a> Screen<'a> {
     }
 }
 
-/// How far inside the sides, the near and the far plane a point of clip space is (depth reversed).
+/// Signed distances of a point of clip space from the sides, the near and the far plane; positive inside (reversed
+/// depth).
 fn inside(p: DVec4) -> [f64; 6] {
     [p.w - p.x, p.w + p.x, p.w - p.y, p.w + p.y, p.w - p.z, p.z]
 }
@@ -230,21 +264,21 @@ mod tests {
         }
     }
 
-    fn measure(view: &View, corners: &[([i32; 2], f32)]) -> Economy {
+    fn measure(view: &View, corners: &[([i32; 2], f32)]) -> Triangles {
         let nothing = vec![0.0; (view.size[0] * view.size[1]) as usize];
-        economy(&field(), view, &Geometry::default(), &list(corners), &nothing)
+        triangles(&field(), view, &Geometry::default(), &list(corners), &nothing)
     }
 
     #[test]
     fn areas_are_exact_and_clipped_to_the_picture() {
         let half_field = [([0, 0], 0.0), ([0, SIDE], 0.0), ([SIDE, 0], 0.0)];
         let whole = measure(&above(32.0, 32.0, 100), &half_field);
-        assert_eq!((whole.triangles, whole.shown, whole.outside, whole.facing_away), (1, 1, 0, 0));
+        assert_eq!((whole.submitted, whole.shown, whole.outside, whole.facing_away), (1, 1, 0, 0));
         assert!((whole.area_px - 64.0 * 64.0 / 2.0 * 16.0).abs() < 1e-6, "{whole:?}");
         // A window of 8 m whose upper left half lies on the triangle.
         let part = measure(&above(32.0, 32.0, 8), &half_field);
         assert!((part.area_px - 8.0 * 8.0 / 2.0 * 16.0).abs() < 1e-6, "{part:?}");
-        assert_eq!(part.sizes_px.counts.iter().position(|&n| n == 1), Some(8 + 9 + 1), "512 px²");
+        assert_eq!(part.sizes_px.bins.iter().find(|bin| bin.count == 1).unwrap().from, 512.0);
         assert_eq!(measure(&above(60.0, 60.0, 4), &half_field).outside, 1);
     }
 
@@ -262,7 +296,7 @@ mod tests {
             ([21, 20], 0.0), // 8 px².
         ];
         let found = measure(&above(32.0, 32.0, 100), &corners);
-        assert_eq!([found.triangles, found.degenerate, found.facing_away, found.shown, found.outside], [3, 1, 1, 1, 0]);
+        assert_eq!([found.submitted, found.degenerate, found.facing_away, found.shown, found.outside], [3, 1, 1, 1, 0]);
         // From below everything is the other way round.
         let mut below = above(32.0, 32.0, 100);
         below.eye.y = -100.0;
@@ -298,7 +332,7 @@ mod tests {
         // 1 px a metre: areas 1/2, 2, 1/2 and 8 px².
         view.size = [100, 100];
         let found = measure(&view, &corners);
-        assert_eq!((found.shown, found.sub_pixel_share), (4, 0.5));
+        assert_eq!((found.shown, found.sub_pixel()), (4, 2));
         assert!((found.area_px - 11.0).abs() < 1e-9);
     }
 
@@ -314,14 +348,16 @@ mod tests {
         let [w, h] = view.size;
         let drawn = |k: u32| if k % w >= w / 2 { depth_of(10.0) as f32 } else { depth_of(0.0) as f32 };
         let depth: Vec<f32> = (0..w * h).map(drawn).collect();
-        let found = economy(&field(), &view, &Geometry::default(), &list(&corners), &depth);
+        let found = triangles(&field(), &view, &Geometry::default(), &list(&corners), &depth);
         assert_eq!((found.shown, found.hidden), (6, 2));
         assert_eq!(measure(&view, &corners).hidden, 0);
     }
 
     #[test]
     fn overdraw_is_a_ratio() {
-        assert_eq!(overdraw(300, 200), Some(1.5));
-        assert_eq!(overdraw(0, 0), None);
+        let of = |fragments, covered| Economy::new(&Triangles::default(), fragments, covered);
+        assert_eq!(of([Some(300), None], 200).overdraw, Some(1.5));
+        assert_eq!(of([None, Some(200)], 200).passed, Some(1.0));
+        assert_eq!(of([Some(0), None], 0).overdraw, None);
     }
 }

@@ -1,4 +1,4 @@
-//! What land in front hides: places held against the depth of the finished frame.
+//! Visibility of places, by comparison with the depth buffer of the finished frame.
 
 use glam::DVec4;
 
@@ -10,23 +10,23 @@ pub struct Depths<'a> {
     pub values: &'a [f32],
 }
 
-/// How much deeper than what was drawn there a place must lie: depths are rounded.
+/// Smallest relative difference of depth that hides a place: depths are rounded.
 const MARGIN: f64 = 1e-3;
 
-/// How far the corners of a polygon are drawn towards its middle before they are looked at: on an edge its
-/// neighbour may be in front.
+/// Share by which the corners of a polygon are moved towards its middle before the test: on its edge a neighbour may be
+/// in front.
 const INWARD: f64 = 0.1;
 
 impl Depths<'_> {
-    /// Whether a polygon in clip space, inside the picture, is hidden: its middle and all its corners, drawn inward.
+    /// Returns true if a polygon in clip space, inside the picture, is hidden: its middle and all its corners, moved inward.
     pub fn hide(&self, polygon: &[DVec4]) -> bool {
         let middle = polygon.iter().sum::<DVec4>() / polygon.len() as f64;
         let inward = polygon.iter().map(|corner| corner.lerp(middle, INWARD));
         inward.chain([middle]).all(|place| self.hides(place))
     }
 
-    /// Whether a place is deeper than all that was drawn around its pixel: at a grazing angle one pixel holds land near
-    /// and far.
+    /// Returns true if a place is deeper than all drawn depths around its pixel: at a grazing angle one pixel holds near
+    /// and far terrain.
     fn hides(&self, place: DVec4) -> bool {
         let [w, h] = self.size.map(|n| n as i64);
         let pixel = |n: f64, count: i64| ((n / place.w + 1.0) / 2.0 * count as f64).floor() as i64;

@@ -1,29 +1,50 @@
 //! Counts of non-negative values by powers of two.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Bin 0 counts values below 2^`lowest`, 0 among them; bin k ≥ 1 those from 2^(`lowest` + k − 1) up to, but not
-/// including, 2^(`lowest` + k); the last one all from its lower end on, infinity too.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+use super::extended::{self, Extended};
+
+/// One bin of a histogram.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Bin {
+    /// Lower end, inclusive.
+    pub from: f64,
+    /// Upper end, exclusive; infinite for the last bin.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
+    pub to: f64,
+    /// Number of values.
+    pub count: u64,
+}
+
+/// Counts by bins in ascending order.
+///
+/// The first bin starts at 0 and ends at the lowest power of two. Each further one doubles its start. The last one has
+/// no end and counts infinity too.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
 pub struct Histogram {
-    /// Power of two at which bin 1 begins.
-    pub lowest: i32,
-    /// One count a bin.
-    pub counts: Vec<u64>,
+    /// The bins.
+    pub bins: Vec<Bin>,
 }
 
 impl Histogram {
-    /// Empty, with ends at 2^`lowest`, …, 2^`highest`.
+    /// Returns an empty histogram with bin ends at 2^`lowest`, …, 2^`highest`.
     pub fn new(lowest: i32, highest: i32) -> Self {
-        Self { lowest, counts: vec![0; (highest - lowest) as usize + 2] }
+        let ends: Vec<f64> = (lowest..=highest).map(|power| 2f64.powi(power)).collect();
+        let from = [0.0].into_iter().chain(ends.iter().copied());
+        let to = ends.iter().copied().chain([f64::INFINITY]);
+        Self { bins: from.zip(to).map(|(from, to)| Bin { from, to, count: 0 }).collect() }
     }
 
-    /// Counts a value that is no negative number.
+    /// Counts a value, which must not be negative or NaN.
     pub fn add(&mut self, value: f64) {
-        let last = self.counts.len() as i32 - 1;
-        // The exponent of the number itself: no logarithm that could round across a bin's end.
-        let exponent = (value.to_bits() >> 52 & 0x7ff) as i32 - 1023;
-        self.counts[(exponent - self.lowest + 1).clamp(0, last) as usize] += 1;
+        // The exponents themselves: a logarithm could round across the end of a bin.
+        let exponent = |value: f64| (value.to_bits() >> 52 & 0x7ff) as i32;
+        let bin = exponent(value) - exponent(self.bins[0].to) + 1;
+        let last = self.bins.len() as i32 - 1;
+        self.bins[bin.clamp(0, last) as usize].count += 1;
     }
 
     /// Adds the counts of another histogram with the same bins.
@@ -31,18 +52,16 @@ impl Histogram {
     /// # Panics
     /// If the bins differ.
     pub fn merge(&mut self, other: &Histogram) {
-        assert_eq!((self.lowest, self.counts.len()), (other.lowest, other.counts.len()), "the same bins");
-        self.counts.iter_mut().zip(&other.counts).for_each(|(mine, theirs)| *mine += theirs);
+        assert_eq!(self.bins.len(), other.bins.len(), "the same bins");
+        for (mine, theirs) in self.bins.iter_mut().zip(&other.bins) {
+            assert_eq!((mine.from, mine.to), (theirs.from, theirs.to), "the same bins");
+            mine.count += theirs.count;
+        }
     }
 
-    /// Where a bin begins, inclusive.
-    pub fn begin(&self, bin: usize) -> f64 {
-        if bin == 0 { 0.0 } else { 2f64.powi(self.lowest + bin as i32 - 1) }
-    }
-
-    /// All values counted.
+    /// Returns the number of all values.
     pub fn total(&self) -> u64 {
-        self.counts.iter().sum()
+        self.bins.iter().map(|bin| bin.count).sum()
     }
 }
 
@@ -54,12 +73,14 @@ mod tests {
     fn values_fall_between_their_bins_ends() {
         let mut histogram = Histogram::new(-2, 3);
         for value in [0.0, 1e-300, 0.25f64.next_down(), 0.25, 0.3, 1.0, 2f64.next_down(), 7.9, 8.0, f64::INFINITY] {
-            let before = histogram.counts.clone();
+            let before = histogram.clone();
             histogram.add(value);
-            let bin = (0..before.len()).find(|&k| histogram.counts[k] > before[k]).unwrap();
-            let end = if bin + 1 < before.len() { histogram.begin(bin + 1) } else { f64::INFINITY };
-            assert!(histogram.begin(bin) <= value && (value < end || end.is_infinite()), "{value} in bin {bin}");
+            let grown = |(after, before): &(&Bin, &Bin)| after.count > before.count;
+            let (bin, _) = histogram.bins.iter().zip(&before.bins).find(grown).unwrap();
+            assert!(bin.from <= value && (value < bin.to || bin.to.is_infinite()), "{value} in {bin:?}");
         }
-        assert_eq!(histogram.counts, [3, 2, 0, 2, 0, 1, 2]);
+        let counts: Vec<u64> = histogram.bins.iter().map(|bin| bin.count).collect();
+        assert_eq!(counts, [3, 2, 0, 2, 0, 1, 2]);
+        assert_eq!(histogram.total(), 10);
     }
 }

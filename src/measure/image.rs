@@ -1,4 +1,4 @@
-//! How far a picture is from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
+//! Difference of a picture from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
 //!
 //! - SSIM: Z. Wang, A. Bovik, H. Sheikh and E. Simoncelli, "Image Quality Assessment: From Error Visibility to
 //!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of §III.C, on luma
@@ -9,17 +9,54 @@
 use image::RgbImage;
 use nv_flip::{FlipImageRgb8, flip as authors_flip, magma_lut};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How finely the eye that FLIP stands for sees the pictures: a screen 0.7 m wide with 3840 pixels, 0.7 m away.
+use super::extended::{self, Extended};
+
+/// Viewing condition of FLIP, pixels per degree: a screen 0.7 m wide with 3840 pixels, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
 /// Samples along a side of SSIM's window, and its standard deviation.
 const WINDOW: usize = 11;
 const SIGMA: f64 = 1.5;
 
-/// The figures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Pictures against their references: means over all pairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImageError {
+    /// Root mean square difference, as a share of a channel's full range.
+    #[schemars(range(min = 0.0))]
+    pub rmse: f64,
+    /// Peak signal-to-noise ratio, decibels; infinite for equal pictures.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
+    pub psnr: f64,
+    /// Structural similarity; 1 for equal pictures.
+    pub ssim: f64,
+    /// FLIP; 0 for equal pictures.
+    #[schemars(range(min = 0.0))]
+    pub flip: f64,
+}
+
+impl ImageError {
+    /// Returns the means; the ratio is that of the mean noise. `None` without pictures.
+    pub fn mean(pictures: &[Difference]) -> Option<Self> {
+        let mean = |of: fn(&Difference) -> Option<f64>| {
+            let values: Vec<f64> = pictures.iter().filter_map(of).collect();
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let noise = mean(|d| Some(d.rmse * d.rmse))?;
+        Some(Self {
+            rmse: noise.sqrt() / 255.0,
+            psnr: if noise > 0.0 { 10.0 * (255.0 * 255.0 / noise).log10() } else { f64::INFINITY },
+            ssim: mean(|d| d.ssim).unwrap_or(1.0),
+            flip: mean(|d| Some(d.flip_mean))?,
+        })
+    }
+}
+
+/// One picture against its reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Root of the mean square over all pixels and channels, in steps of 1/255.
     pub rmse: f64,
@@ -43,22 +80,22 @@ pub struct SizesDiffer {
     pub reference: (u32, u32),
 }
 
-/// Compares a picture with its reference. Beside the figures, FLIP of every pixel in the colours of its paper:
+/// Compares a picture with its reference. Also returns FLIP of every pixel in the colours of its paper:
 /// from black for none over violet and orange to pale yellow.
 pub fn compare(picture: &RgbImage, reference: &RgbImage) -> Result<(Difference, RgbImage), SizesDiffer> {
     if picture.dimensions() != reference.dimensions() {
         return Err(SizesDiffer { picture: picture.dimensions(), reference: reference.dimensions() });
     }
     let rmse = rmse(picture, reference);
-    let (flip, difference) = flip(picture, reference);
-    let figures = Difference {
+    let (flip, flipped) = flip(picture, reference);
+    let difference = Difference {
         rmse,
         psnr_db: (rmse > 0.0).then(|| 20.0 * (255.0 / rmse).log10()),
         ssim: ssim(picture, reference),
         flip_mean: flip.iter().map(|&f| f64::from(f)).sum::<f64>() / flip.len().max(1) as f64,
         flip_max: f64::from(flip.iter().copied().fold(0.0, f32::max)),
     };
-    Ok((figures, difference))
+    Ok((difference, flipped))
 }
 
 fn rmse(picture: &RgbImage, reference: &RgbImage) -> f64 {

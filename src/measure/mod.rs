@@ -4,6 +4,7 @@
 
 pub mod beyond;
 pub mod economy;
+pub mod extended;
 pub mod geometric;
 pub mod hidden;
 pub mod histogram;
@@ -28,7 +29,7 @@ use crate::view::{Lens, View};
 const PART: usize = 1 << 15;
 const BATCH: usize = 64;
 
-/// Whether a world point falls into the picture, between the near and the far plane.
+/// Returns true if a world point falls into the picture, between the near and the far plane.
 pub fn in_view(view: &View, point: DVec3) -> bool {
     let far = match view.lens {
         Lens::Perspective { .. } => f64::INFINITY,

@@ -9,8 +9,10 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::extended;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
@@ -21,23 +23,19 @@ pub struct Pool {
     beside: u64,
 }
 
-/// What a pool holds. Percentiles are exact: the smallest error that so many of the pixels do not exceed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pooled {
-    /// Covered pixels.
-    pub pixels: u64,
-    /// Covered pixels that show no point above or below land with data, by rounding at its border or at a hole:
-    /// they are in no other figure.
-    pub beside: u64,
-    /// Mean, pixels.
+/// The peers' metric, pixels, pooled over frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
+pub struct PeersError {
+    /// Mean.
     pub mean: f64,
-    /// Root of the mean square, pixels.
+    /// Root mean square.
     pub rms: f64,
-    /// 95th percentile, pixels.
+    /// 95th percentile.
     pub p95: f64,
-    /// 99th percentile, pixels.
+    /// 99th percentile.
     pub p99: f64,
-    /// Largest, pixels.
+    /// Largest value.
     pub max: f64,
 }
 
@@ -56,20 +54,29 @@ impl Pool {
         self.errors_px.extend(covered.into_iter().flatten());
     }
 
-    /// The figures.
-    pub fn summary(&self) -> Pooled {
+    /// Returns the number of covered pixels.
+    pub fn pixels(&self) -> u64 {
+        self.errors_px.len() as u64 + self.beside
+    }
+
+    /// Returns the number of covered pixels without terrain above or below the shown point, by rounding at a border or
+    /// a hole. They have no error.
+    pub fn beside(&self) -> u64 {
+        self.beside
+    }
+
+    /// Returns the statistics of all errors so far; zeros without any. Percentiles are exact, by rank.
+    pub fn summary(&self) -> PeersError {
         let mut sorted = self.errors_px.clone();
         sorted.par_sort_unstable_by(f32::total_cmp);
         let n = sorted.len();
         if n == 0 {
-            return Pooled { pixels: self.beside, beside: self.beside, ..Pooled::default() };
+            return PeersError::default();
         }
         // Summed from the smallest on: the same on every machine, with the least rounding.
         let sum = |power: i32| sorted.iter().map(|&e| f64::from(e).powi(power)).sum::<f64>() / n as f64;
         let percentile = |percent: usize| f64::from(sorted[(n * percent).div_ceil(100) - 1]);
-        Pooled {
-            pixels: n as u64 + self.beside,
-            beside: self.beside,
+        PeersError {
             mean: sum(1),
             rms: sum(2).sqrt(),
             p95: percentile(95),
@@ -142,7 +149,7 @@ mod tests {
         cells.flat_map(|(i, j)| rtin::cell(i, j)).map(|t| t.map(world)).collect()
     }
 
-    /// Where a ray meets a triangle (Möller and Trumbore 1997), in lengths of its direction.
+    /// Returns the distance at which a ray meets a triangle (Möller and Trumbore 1997), in lengths of its direction.
     fn meets(from: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
         let (ab, ac) = (b - a, c - a);
         let across = direction.cross(ac);
@@ -154,7 +161,7 @@ mod tests {
         (u >= -1e-9 && v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 0.0).then_some(t)
     }
 
-    /// What a pixel's ray meets first, and its depth, by the clip matrix.
+    /// Returns the first hit of a pixel's ray, and its depth by the clip matrix.
     fn cast(view: &View, triangles: &[[DVec3; 3]], pixel: [usize; 2]) -> Option<(DVec3, f32)> {
         let clip = |k: usize| 2.0 * (pixel[k] as f64 + 0.5) / f64::from(view.size[k]) - 1.0;
         let world_from_clip = view.clip_from_relative().inverse();
@@ -209,7 +216,7 @@ mod tests {
             let found = pool.summary();
             expected.sort_by(f64::total_cmp);
             let n = expected.len();
-            assert!(found.pixels - found.beside >= n as u64 - 2 && found.beside < 20, "{found:?}");
+            assert!(pool.pixels() - pool.beside() >= n as u64 - 2 && pool.beside() < 20, "{pool:?}");
             let mean = expected.iter().sum::<f64>() / n as f64;
             let rms = (expected.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
             let [p95, p99] = [95, 99].map(|percent| expected[n * percent / 100]);
@@ -236,17 +243,18 @@ mod tests {
             pixels(&view).map(|p| cast(&view, &triangles, p).map_or(0.0, |(_, depth)| depth)).collect()
         };
         let mut pool = Pool::default();
-        assert_eq!(pool.summary(), Pooled::default());
+        assert_eq!(pool.summary(), PeersError::default());
         pool.add(&field, &view, &depths(0.0));
-        let one = pool.summary();
-        assert!(one.pixels > 1000 && one.max < 1e-3, "{one:?}");
+        let (one, max) = (pool.clone(), pool.summary().max);
+        assert!(one.pixels() > 1000 && max < 1e-3, "{max} px");
         let lifted = depths(2.0);
         let mut alone = Pool::default();
         alone.add(&field, &view, &lifted);
         pool.add(&field, &view, &lifted);
+        assert_eq!(pool.pixels(), one.pixels() + alone.pixels());
+        let share = (alone.pixels() - alone.beside()) as f64 / (pool.pixels() - pool.beside()) as f64;
         let (alone, both) = (alone.summary(), pool.summary());
-        assert!(alone.mean > 0.5 && both.pixels == one.pixels + alone.pixels, "{both:?}");
-        let share = (alone.pixels - alone.beside) as f64 / (both.pixels - both.beside) as f64;
+        assert!(alone.mean > 0.5, "{alone:?}");
         assert!((both.mean - alone.mean * share).abs() < 1e-3 && both.max == alone.max, "{both:?}, {alone:?}");
     }
 

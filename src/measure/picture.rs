@@ -1,7 +1,7 @@
-//! What is wrong in a picture: pixels where the sky shines through land.
+//! Faults in a picture: pixels where the sky shines through terrain.
 
-/// How far, in pixels, a hole must be from the land's outline in the truth to count: the tolerance may move the
-/// outline by that much, and rasterisation by one pixel more.
+/// Returns the smallest distance, pixels, of a hole from the terrain's outline in the reference picture. The tolerance
+/// may move the outline by as much, and rasterisation by one pixel more.
 pub fn outline_radius(tolerance_px: f64) -> usize {
     tolerance_px.ceil() as usize + 1
 }

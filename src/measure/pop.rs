@@ -8,12 +8,14 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::extended::{self, Extended};
 use super::geometric::owns;
 use super::histogram::Histogram;
 use super::projection::Projection;
-use super::summary::{Place, Tally, infinite_if_null};
+use super::summary::{Place, Tally};
 use super::{each_part, facing_up};
 use crate::draw::layout::Frame;
 use crate::draw::{Draw, DrawList, Geometry, expand};
@@ -24,8 +26,8 @@ use crate::view::View;
 /// Powers of two, px, between which the histogram has its bins: from 1/64 px, far below what anybody sees, to 64.
 const BINS: [i32; 2] = [-6, 6];
 
-/// What a frame was drawn from. A technique with uploads changes its resident geometry from frame to frame:
-/// then a copy from before goes with the list from before.
+/// The data of a drawn frame. A technique with uploads changes its resident geometry from frame to frame: the earlier
+/// state then needs a copy of it.
 #[derive(Clone, Copy, Debug)]
 pub struct State<'a> {
     /// The view that the list was made for.
@@ -36,24 +38,33 @@ pub struct State<'a> {
     pub list: &'a DrawList,
 }
 
-/// What [`pop`] finds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Displacement of the surface on the screen when the level of detail changes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pop {
-    /// Samples measured.
-    pub samples: u64,
-    /// Exact: the smallest displacement, pixels, that 99 % of the samples do not exceed.
-    #[serde(deserialize_with = "infinite_if_null")]
+    /// 99th percentile, pixels: of several frames, the largest of any frame.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
     pub p99_px: f64,
-    /// The same of 99.9 %.
-    #[serde(deserialize_with = "infinite_if_null")]
+    /// 99.9th percentile, pixels: of several frames, the largest of any frame.
+    #[serde(with = "extended", default)]
+    #[schemars(with = "Extended")]
     pub p999_px: f64,
     /// Largest displacement, pixels.
-    #[serde(deserialize_with = "infinite_if_null")]
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
     pub max_px: f64,
-    /// The sample with the largest; `None` if nothing moved.
-    pub at: Option<[u32; 2]>,
-    /// Samples by displacement, pixels: bins from 2^−6 to 2^6.
+    /// Samples by displacement, pixels.
     pub histogram: Histogram,
+}
+
+impl Pop {
+    /// Adds the displacements of another frame.
+    pub fn merge(&mut self, frame: &Pop) {
+        self.histogram.merge(&frame.histogram);
+        self.p99_px = self.p99_px.max(frame.p99_px);
+        self.p999_px = self.p999_px.max(frame.p999_px);
+        self.max_px = self.max_px.max(frame.max_px);
+    }
 }
 
 /// Measures the jump from the level of detail of frame t − 1 to that of frame t in the view of frame t. Takes
@@ -67,14 +78,7 @@ pub fn pop(field: &Field, before: State, after: State) -> Pop {
         tally.merge(part_tally);
         histogram.merge(&part_histogram);
     });
-    Pop {
-        samples: tally.count,
-        p99_px: tally.quantile(),
-        p999_px: tally.quantile_above(1000),
-        max_px: tally.largest,
-        at: tally.largest_at.map(|place| place.sample),
-        histogram,
-    }
+    Pop { p99_px: tally.quantile(), p999_px: tally.quantile_above(1000), max_px: tally.largest, histogram }
 }
 
 struct Meter<'a> {
@@ -191,11 +195,10 @@ mod tests {
         let found = jump(&slab(SIDE, 3.0), &slab(SIDE, 11.0));
         // 8 m at 0.5 px a metre, seen from 45° above.
         let expected = 4.0 * 0.5f64.sqrt();
-        assert_eq!(found.samples, 41 * 41 - 1, "all but the hole");
+        assert_eq!(found.histogram.total(), 41 * 41 - 1, "all but the hole");
         assert!((found.max_px - expected).abs() < 1e-9 && (found.p99_px - expected).abs() < 1e-9, "{found:?}");
-        // 2.83 px lie in the bin from 2 to 4.
-        assert_eq!(found.histogram.counts.iter().position(|&n| n == found.samples), Some(8));
-        assert_eq!(found.histogram.begin(8), 2.0);
+        let full = found.histogram.bins.iter().find(|bin| bin.count == found.histogram.total()).unwrap();
+        assert_eq!((full.from, full.to), (2.0, 4.0), "2.83 px");
     }
 
     #[test]
@@ -207,7 +210,7 @@ mod tests {
         split.draws[0].indices = 0..12;
         for after in [slab(SIDE, 3.0), split] {
             let found = jump(&slab(SIDE, 3.0), &after);
-            assert_eq!((found.samples, found.histogram.counts[0]), (1680, 1680));
+            assert_eq!((found.histogram.total(), found.histogram.bins[0].count), (1680, 1680));
             assert!(found.max_px < 1e-9, "{found:?}");
         }
     }
@@ -216,7 +219,7 @@ mod tests {
     fn only_terrain_drawn_in_both_counts() {
         // Columns 0 to 9 and 0 to 19: the east side of the smaller one belongs to nobody.
         let found = jump(&slab(10, 3.0), &slab(20, 4.0));
-        assert_eq!(found.samples, 10 * 41, "columns 0 to 9");
+        assert_eq!(found.histogram.total(), 10 * 41, "columns 0 to 9");
     }
 
     #[test]
@@ -230,6 +233,5 @@ mod tests {
         let found = jump(&slab(SIDE, 3.0), &after);
         assert!((found.max_px - 50.0 * 0.5f64.sqrt()).abs() < 1e-9 && found.p99_px < 1e-9, "{found:?}");
         assert!(found.p999_px >= found.p99_px && found.p999_px <= found.max_px, "{found:?}");
-        assert_eq!(found.at, Some([0, 0]));
     }
 }

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::view::{Lens, Projected, View};
 
-/// What [`View::project`] works out for each point anew.
+/// The per-view constants of [`View::project`].
 pub struct Projection {
     eye: DVec3,
     eye_from_world: DMat3,
@@ -33,8 +33,8 @@ impl Projection {
         }
     }
 
-    /// Where a point falls on the screen, or would but for the near plane; `None` in a perspective view at or
-    /// behind the eye, where it has no image.
+    /// Projects a point, also one before the near plane. `None` at or behind the eye of a perspective view, where it has
+    /// no image.
     #[inline]
     pub fn project(&self, point: DVec3) -> Option<Projected> {
         let at = self.eye_from_world * (point - self.eye);

@@ -4,38 +4,68 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
-use serde::{Deserialize, Deserializer, Serialize};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::extended::{self, Extended};
 
 /// A quantity over all samples in view.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
-    /// Samples.
-    pub count: u64,
-    /// Root of the mean square.
-    #[serde(deserialize_with = "infinite_if_null")]
+    /// Root mean square.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
     pub rms: f64,
-    /// Exact: the smallest value that 99.9 % of the samples do not exceed.
-    #[serde(deserialize_with = "infinite_if_null")]
+    /// 99.9th percentile: of several frames, the largest of any frame.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
     pub p999: f64,
-    /// Largest.
-    #[serde(deserialize_with = "infinite_if_null")]
+    /// Largest value.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
     pub max: f64,
 }
 
 impl Summary {
     /// The same in a unit of the given size.
     pub fn in_units_of(&self, unit: f64) -> Summary {
-        Summary { count: self.count, rms: self.rms / unit, p999: self.p999 / unit, max: self.max / unit }
+        Summary { rms: self.rms / unit, p999: self.p999 / unit, max: self.max / unit }
     }
 }
 
-/// JSON has no infinity, writers put `null` in its place.
-pub(super) fn infinite_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+/// A quantity over several frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pool {
+    count: u64,
+    squares: f64,
+    p999: f64,
+    max: f64,
+}
+
+impl Pool {
+    /// Adds a frame's summary of `count` samples.
+    pub fn add(&mut self, count: u64, frame: &Summary) {
+        self.count += count;
+        if count > 0 {
+            self.squares += count as f64 * frame.rms * frame.rms;
+        }
+        self.p999 = self.p999.max(frame.p999);
+        self.max = self.max.max(frame.max);
+    }
+
+    /// True before the first sample.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Returns the root mean square over all samples, and the largest of the frames' percentiles and maxima.
+    pub fn summary(&self) -> Summary {
+        Summary { rms: (self.squares / self.count.max(1) as f64).sqrt(), p999: self.p999, max: self.max }
+    }
 }
 
 /// A sample and the point drawn for it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Lattice position.
     pub sample: [u32; 2],
@@ -117,7 +147,7 @@ impl Tally {
     /// With the quantile as 99.9th percentile.
     pub fn summary(&self) -> Summary {
         debug_assert_eq!(self.denominator, 1000);
-        Summary { count: self.count, rms: self.rms(), p999: self.quantile(), max: self.largest }
+        Summary { rms: self.rms(), p999: self.quantile(), max: self.largest }
     }
 }
 
@@ -148,9 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn an_infinite_summary_survives_json() {
-        let summary = Summary { count: 3, rms: f64::INFINITY, p999: 2.5, max: f64::INFINITY };
-        let text = serde_json::to_string(&summary).unwrap();
-        assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), summary);
+    fn frames_are_weighted_by_their_samples() {
+        let mut pool = Pool::default();
+        assert!(pool.is_empty());
+        pool.add(0, &Summary::default());
+        pool.add(3, &Summary { rms: 1.0, p999: 4.0, max: 5.0 });
+        pool.add(1, &Summary { rms: 3.0, p999: 2.0, max: 9.0 });
+        assert_eq!(pool.summary(), Summary { rms: 3f64.sqrt(), p999: 4.0, max: 9.0 });
     }
 }

@@ -43,8 +43,8 @@ pub fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// How many of `n` sorted values may be left out at either end: so many that more lie on one side of the median
-/// by chance in at most 2.5 % of all samples.
+/// Returns the number of values to drop at either end of `n` sorted ones for a 95 % interval of the median: in at most
+/// 2.5 % of all samples, chance puts more of them on one side of the median.
 fn cut(n: usize) -> usize {
     let mut chance = 0.5f64.powi(n as i32);
     let mut beyond = chance;

@@ -1,7 +1,7 @@
-//! Where a frame's time goes: every pass, pipeline and draw with its label, device time and programs run; the host's
-//! steps beside it on one line of time; and the ways to submit the same land side by side.
+//! Profile of a frame: device time and shader invocations of every pass, pipeline and draw, with the host's steps on the
+//! same time line, and a comparison of submission modes for the same terrain.
 //!
-//! [`run()`] measures, everything else turns what it found into rows, a table and a trace, and needs no device.
+//! [`run()`] measures. All other modules turn its results into rows, a table and a trace, and need no device.
 
 pub mod estimate;
 pub mod files;

@@ -53,7 +53,7 @@ pub struct DrawRow {
     pub label: String,
     /// The pass it is in.
     pub pass: String,
-    /// What its indices address and what they make.
+    /// Vertex source and topology.
     pub pipeline: String,
     /// Its number in the list: what the colour `batch` shows; of the first, if it is several.
     pub batch: usize,
@@ -139,7 +139,7 @@ pub struct ModeRow {
 pub struct Profile {
     /// Frames behind each median.
     pub frames: u32,
-    /// How the device's times lie on the host's: `calibrated`, or `aligned, not calibrated`.
+    /// Relation of the device's clock to the host's: `calibrated`, or `aligned, not calibrated`.
     pub clock: String,
     /// Microseconds by which the device's times in the trace may be shifted against the host's.
     pub clock_deviation_us: f64,

@@ -25,7 +25,7 @@ pub struct Form {
     pub technique: Box<dyn Technique>,
 }
 
-/// What was measured, and the means to capture more.
+/// Measurements, and the means to capture more.
 pub struct Measured {
     /// The rows.
     pub profile: Profile,

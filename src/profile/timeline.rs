@@ -20,7 +20,7 @@ pub fn tracks(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Track> {
     vec![Track { name: "CPU".to_string(), slices: host }, Track { name: "GPU".to_string(), slices: device }]
 }
 
-/// What the draws add up to as they end.
+/// Running totals at the end of each draw.
 pub fn counters(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Counter> {
     let running = |name, of: fn(&DrawRow) -> Option<u64>| {
         let mut sum = 0;
@@ -51,7 +51,7 @@ fn pipelines(draws: &[(Span, &DrawRow)]) -> Vec<Slice> {
     slices
 }
 
-/// What a draw's row says beside its label and its times.
+/// Returns the values of a draw's row other than label and times.
 fn args_of(row: &DrawRow) -> Map<String, Value> {
     let Ok(Value::Object(fields)) = serde_json::to_value(row) else { return Map::new() };
     let shown = |name: &str, value: &Value| name != "label" && !name.starts_with("gpu_us") && !value.is_null();

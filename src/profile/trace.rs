@@ -13,15 +13,15 @@ const PROCESS: u32 = 1;
 /// A stretch of time on a track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// What is shown on it.
+    /// Events of the track.
     pub name: String,
-    /// What it is: step, pass, pipeline or draw.
+    /// Category: step, pass, pipeline or draw.
     pub category: &'static str,
-    /// When it began, microseconds.
+    /// Start, microseconds.
     pub start_us: f64,
-    /// When it ended, microseconds.
+    /// End, microseconds.
     pub end_us: f64,
-    /// What is shown when it is chosen.
+    /// Details shown when it is selected.
     pub args: Map<String, Value>,
 }
 

@@ -1,6 +1,6 @@
 //! An axis: from values to places on a line, and the ticks between its ends.
 
-/// How values lie on an axis.
+/// Placement of values on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Equal steps for equal differences; begins at 0.
@@ -15,9 +15,9 @@ const DECADES: f64 = 4.0;
 /// One axis of a chart.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, and in which unit.
+    /// Quantity and unit.
     pub label: String,
-    /// Whether a logarithmic form exists.
+    /// True if a logarithmic form exists.
     pub scale: Scale,
 }
 
@@ -49,7 +49,7 @@ impl Range {
         }
     }
 
-    /// Where a value lies: 0 at the lower end, 1 at the upper; values beyond lie on the ends.
+    /// Returns the position of a value: 0 at the lower end, 1 at the upper; values beyond are clamped.
     pub fn place(&self, value: f64) -> f64 {
         let part = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -86,7 +86,7 @@ fn step(high: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|s| *s <= rough).unwrap_or(decade)
 }
 
-/// Where a logarithmic axis may end.
+/// Returns the possible ends of a logarithmic axis.
 const MARKS: [f64; 8] = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0];
 
 fn round_down(value: f64) -> f64 {

@@ -20,9 +20,9 @@ pub const COLOURS: [&str; 5] = ["#e69f00", "#cc79a7", "#009e73", "#0072b2", "#bb
 /// Bars of one unit.
 #[derive(Clone, Debug)]
 pub struct Bars {
-    /// What they show.
+    /// Quantity shown.
     pub title: String,
-    /// How to read them.
+    /// Reading hint.
     pub about: String,
     /// Name and unit of the axis.
     pub label: String,

@@ -34,15 +34,15 @@ const MARKERS: [&str; 7] = [
 /// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// What it shows, in a few words.
+    /// Title.
     pub title: String,
-    /// How to read it, in a sentence.
+    /// Reading hint, one sentence.
     pub about: String,
     /// To the right.
     pub x: Axis,
     /// Upwards.
     pub y: Axis,
-    /// What is shown.
+    /// Contents.
     pub series: Vec<Series>,
     /// A line through points that belong together across the series.
     pub guide: Option<Guide>,
@@ -70,9 +70,9 @@ pub struct Point {
     pub y: f64,
     /// The interval of y.
     pub interval: Option<[f64; 2]>,
-    /// What it is and what its values are.
+    /// Label with its values.
     pub label: String,
-    /// Whether it is marked.
+    /// True if it is marked.
     pub marked: bool,
 }
 
@@ -85,7 +85,7 @@ pub struct Guide {
     pub points: Vec<[f64; 2]>,
 }
 
-/// How the axes of one drawing are.
+/// Axes of one drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// As each axis is by itself.
@@ -109,12 +109,12 @@ pub fn swatch(style: usize) -> String {
 }
 
 impl Chart {
-    /// Whether there is nothing to draw.
+    /// Returns true if there is nothing to draw.
     pub fn is_empty(&self) -> bool {
         self.series.iter().all(|series| series.points.is_empty())
     }
 
-    /// Whether the linear form differs from the own one.
+    /// Returns true if the linear form differs from the default one.
     pub fn has_logarithm(&self) -> bool {
         [&self.x, &self.y].iter().any(|axis| axis.scale == Scale::Logarithmic)
     }
@@ -284,7 +284,7 @@ pub fn legend_line(line: usize, style: usize, name: &str) -> String {
     )
 }
 
-/// What the page's style sheet says, for a file of its own.
+/// Style sheet for a chart in a file of its own.
 pub fn style_of_files() -> String {
     let colours = COLOURS.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}"));
     colours.collect::<String>()

@@ -1,8 +1,8 @@
-//! Which figures there are, and which numbers of the results stand in them.
+//! The figures of a report and the results in them.
 
 use crate::bench::Errors;
 use crate::bench::results::{CaseResult, Results};
-use crate::bench::rows::Bin;
+use crate::measure::histogram::Bin;
 
 use super::axis::{Axis, Scale};
 use super::bars::{Bar, Bars};
@@ -27,7 +27,7 @@ pub struct SceneFigures {
     pub name: String,
     /// Charts with a short name each.
     pub charts: Vec<(&'static str, Chart)>,
-    /// What frame times are made of.
+    /// Parts of a frame time.
     pub split: Bars,
 }
 
@@ -108,7 +108,7 @@ fn pareto(series: &mut [Series]) -> Guide {
     Guide { name: "Pareto front".to_string(), points: front }
 }
 
-/// What a case is and what came out, in one line.
+/// Returns a case and its results in one line.
 fn told(result: &CaseResult) -> String {
     let mut parts = vec![format!("{}, {} px", result.case.series(), number(result.case.tolerance_px))];
     if let Some(errors) = &result.errors {
@@ -136,13 +136,13 @@ impl SceneFigures {
             (
                 "pop",
                 histogram(&typical, names, "Popping", "displacement when the level of detail changes, px", |e| {
-                    e.pop.as_ref().map(|pop| pop.histogram.as_slice())
+                    e.pop.as_ref().map(|pop| pop.histogram.bins.as_slice())
                 }),
             ),
             (
                 "triangle-size",
                 histogram(&typical, names, "Size of triangles", "pixels per triangle", |e| {
-                    e.economy.as_ref().map(|economy| economy.pixels_per_triangle.as_slice())
+                    e.economy.as_ref().map(|economy| economy.pixels_per_triangle.bins.as_slice())
                 }),
             ),
             ("tolerance-time", tolerance_time(all.clone(), names)),

@@ -14,9 +14,9 @@ use crate::bench::statistics::Estimate;
 pub struct Published {
     /// Authors, year and title.
     pub source: String,
-    /// Which table or section.
+    /// Table or section.
     pub table: String,
-    /// What its numbers are.
+    /// Meaning of its numbers.
     pub about: String,
     /// Machine, picture, data, path.
     pub conditions: String,
@@ -32,12 +32,12 @@ pub struct Published {
 pub struct PublishedRow {
     /// As published.
     pub cells: Vec<String>,
-    /// Which of our cases stand beside it.
+    /// Cases compared with it.
     #[serde(default)]
     pub ours: Vec<Rule>,
 }
 
-/// What a case must be like to stand beside a published row; of several the fastest does.
+/// Conditions on a case to be compared with a published row; of several, the fastest is.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rule {
@@ -50,12 +50,11 @@ pub struct Rule {
     path: Option<String>,
     /// Most that the 99th percentile of the peers' metric may be, pixels.
     peers_p99_px: Option<f64>,
-    /// What stands there is then also this figure that the technique told of itself.
+    /// Also show this statistic of the technique.
     figure: Option<String>,
-    /// What stands there is then the selection alone, on the host; of several cases the one that selects fastest.
+    /// Compare the selection time alone, on the host; of several cases, that of the fastest selection.
     selection: bool,
-    /// What stands there is then how many times as fast as a case of this rule it is, at the same tolerance in the same
-    /// scene.
+    /// Compare the speed relative to a case of this rule, at the same tolerance in the same scene.
     over: Option<Box<Rule>>,
 }
 
@@ -87,7 +86,7 @@ impl Rule {
         }
     }
 
-    /// How many times as fast as those of the other rule the cases are, one by one.
+    /// Returns the speed of the cases relative to those of the other rule, one by one.
     fn speed_ups(&self, other: &Rule, results: &Results) -> Option<String> {
         let speed_up = |result: &CaseResult| {
             let same = |slow: &&CaseResult| {

@@ -32,7 +32,7 @@ pub fn page(stress: &Stress, folder: &Path) -> String {
     )
 }
 
-/// How many checks of each family a technique passed.
+/// Number of checks of each family that a technique passed.
 fn summary(stress: &Stress) -> String {
     let mut counts: BTreeMap<&str, BTreeMap<&str, [usize; 2]>> = BTreeMap::new();
     let mut families: Vec<&str> = Vec::new();

@@ -29,7 +29,7 @@ fn estimate(e: &Estimate) -> String {
     format!("{} <small>{}–{}</small>", number(e.value), number(e.low), number(e.high))
 }
 
-/// What a case gave that was not measured.
+/// Settings of a case.
 const ABSENT: &str = "–";
 
 /// A column of the cases' tables: its name and what a case has there.
@@ -42,7 +42,7 @@ fn overdraw(result: &CaseResult) -> Option<String> {
     Some(number(economy.overdraw?) + &passed)
 }
 
-/// What a case took.
+/// Times of a case.
 const TIMES: &[Column] = &[
     ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
     ("over base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
@@ -64,7 +64,7 @@ const TIMES: &[Column] = &[
     ("device bytes", |r| r.time.as_ref().map(|t| number(t.device_bytes as f64))),
 ];
 
-/// What was wrong with it.
+/// Errors of a case.
 const ERRORS: &[Column] = &[
     ("max, px", |r| r.errors.as_ref().map(|e| number(e.error_px.max))),
     ("99.9 %, px", |r| r.errors.as_ref().map(|e| number(e.error_px.p999))),
@@ -143,7 +143,7 @@ pub fn published(results: &Results) -> String {
     html
 }
 
-/// What each scene needed, and what was left out.
+/// Features that each scene needed, and those left out.
 pub fn plans(plans: &[Plan]) -> String {
     if plans.is_empty() {
         return "<p class=\"absent\">These rows say nothing of it.</p>".to_string();

@@ -1,5 +1,6 @@
 //! Tests of the architecture: allowed module dependencies, where Vulkan may be named, and the maximum file length.
 
+mod circles;
 mod paths;
 mod words;
 
@@ -41,7 +42,7 @@ const EVERYTHING: &[&str] = &[
     "viewer", "report", "renamed",
 ];
 
-/// Returns the violations of a source file as `file:line: reason`. `file` is relative to `src`.
+/// Returns the violations in a file of `src`, each as `file:line: what`. `file` is relative to `src`.
 fn violations(file: &str, text: &str) -> Vec<String> {
     let code = paths::without_comments(text);
     let module = paths::module_of(file);
@@ -78,7 +79,7 @@ fn violations(file: &str, text: &str) -> Vec<String> {
     found
 }
 
-/// Returns the reason if a module must not use a path of the crate.
+/// Returns the reason that forbids a module to use a path of the crate, if any.
 fn forbidden(module: &[String], target: &[String]) -> Option<String> {
     // The crate's root may name any module.
     let (from, to) = (module.first()?, target.first()?);

@@ -35,12 +35,26 @@ pub fn used(code: &str, module: &[String]) -> Vec<(usize, Vec<String>)> {
             base.clear();
             rest = root;
         }
-        let mut paths = Vec::new();
-        tree(rest, &base, &mut paths);
-        let line = code[..at].matches('\n').count() + 1;
-        found.extend(paths.into_iter().map(|path| (line, path)));
+        found.extend(from(code, at, rest, &base));
     }
     found
+}
+
+/// Every path that begins with the name of a child module, resolved in the same way.
+pub fn used_children(code: &str, module: &[String], children: &[&str]) -> Vec<(usize, Vec<String>)> {
+    let is_start = |&(at, word): &(usize, &str)| {
+        let is_first = !code[..at].ends_with("::") || code[..at].ends_with("self::");
+        children.contains(&word) && code[at + word.len()..].starts_with("::") && is_first
+    };
+    words(code).filter(is_start).flat_map(|(at, _)| from(code, at, &code[at..], module)).collect()
+}
+
+/// The paths of a use tree at `at` below a base, with its line.
+fn from(code: &str, at: usize, text: &str, base: &[String]) -> Vec<(usize, Vec<String>)> {
+    let mut paths = Vec::new();
+    tree(text, base, &mut paths);
+    let line = code[..at].matches('\n').count() + 1;
+    paths.into_iter().map(|path| (line, path)).collect()
 }
 
 /// Adds the paths of a use tree to `paths` and returns what follows the tree.

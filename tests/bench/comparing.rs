@@ -3,9 +3,11 @@
 
 use cuesta::bench::compare::{THRESHOLD, compare};
 use cuesta::bench::results::Results;
-use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary, TimeRow, Within};
-use cuesta::bench::run::{FrameSample, Timed};
+use cuesta::bench::rows::{ErrorRow, Errors, Row, TimeRow, Within};
+use cuesta::bench::run::Timed;
+use cuesta::bench::sample::FrameSample;
 use cuesta::bench::{Case, Times};
+use cuesta::measure::summary::Summary;
 
 use super::mock::{self, Mock};
 

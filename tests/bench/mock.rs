@@ -1,4 +1,4 @@
-//! A laboratory without a device: times, errors and pictures from a formula, the same in every run.
+//! A backend without a device: times, errors and pictures from a formula, the same in every run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,21 +6,26 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::goal::ToleranceController;
-use cuesta::bench::rows::{
-    AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, PendingFrames, Plan,
-    Pop, Reference, Summary, Within, Worst,
-};
-use cuesta::bench::run::{BenchBackend, BenchScene, Ended, FrameSample, Run, Timed};
-use cuesta::bench::{Case, SCHEMA, Terrain};
+use cuesta::bench::controller::ToleranceController;
+use cuesta::bench::rows::{Decision, Device, Errors, Header, Machine, PendingFrames, Plan, Within, Worst};
+use cuesta::bench::run::{BenchBackend, BenchScene, Ended, Run, Timed};
+use cuesta::bench::{Case, FrameSample, SCHEMA, Terrain};
 use cuesta::height::Field;
 use cuesta::height::synth::{Kind, synth};
+use cuesta::measure::economy::Economy;
+use cuesta::measure::geometric::AngleBin;
+use cuesta::measure::histogram::{Bin, Histogram};
+use cuesta::measure::image::ImageError;
+use cuesta::measure::peers::PeersError;
+use cuesta::measure::pop::Pop;
+use cuesta::measure::reference::Reference;
+use cuesta::measure::summary::Summary;
 use image::{Rgb, RgbImage};
 
 /// Its one adjustable thing: what it leaves unmeasured.
 #[derive(Default)]
 pub struct Mock {
-    /// Only what every laboratory must give.
+    /// Omit all optional measurements.
     pub is_bare: bool,
     /// Calls so far.
     pub calls: Vec<String>,
@@ -105,13 +110,15 @@ impl BenchBackend for Mock {
             p99_px: case.tolerance_px / 2.0,
             p999_px: case.tolerance_px / 1.5,
             max_px: case.tolerance_px,
-            histogram: (peak - 5..=peak).map(|k| bin(k, 4u64.pow((peak - k + 1) as u32))).collect(),
+            histogram: Histogram { bins: (peak - 5..=peak).map(|k| bin(k, 4u64.pow((peak - k + 1) as u32))).collect() },
         });
         errors.watertight = Some(true);
         (errors.hole_pixels, errors.skirt_pixels) = (Some(0), Some(0));
         errors.pending = Some(PendingFrames { frames: 2, kept: 1, pixels: 77, excess_px: max / 3.0 });
         errors.economy = Some(Economy {
-            pixels_per_triangle: (-2..=8).map(|k| bin(k, (1000 - 30 * (k - peak - 3).pow(2)).max(3) as u64)).collect(),
+            pixels_per_triangle: Histogram {
+                bins: (-2..=8).map(|k| bin(k, (1000 - 30 * (k - peak - 3).pow(2)).max(3) as u64)).collect(),
+            },
             hidden_share: 0.3,
             subpixel_share: 0.04,
             overdraw: Some(1.2),

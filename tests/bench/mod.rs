@@ -1,4 +1,4 @@
-//! The benchmark's driver, rows and comparison, with a laboratory that makes its numbers up.
+//! The benchmark's driver, rows and comparison, with a backend that makes its numbers up.
 
 mod comparing;
 mod holding;

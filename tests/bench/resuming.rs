@@ -1,4 +1,4 @@
-//! What is killed goes on: every row once, whatever byte the file ends at.
+//! A killed run resumes: every row exists once, whatever byte the file ends at.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::mock::{self, Mock};
 
-/// What tells a row from the others.
+/// Identity of a row.
 fn keys(rows: &[Row]) -> Vec<String> {
     let key = |row: &Row| match row {
         Row::Header(_) => panic!("one header is enough"),

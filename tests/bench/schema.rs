@@ -1,4 +1,4 @@
-//! Results and rows against the documented JSON Schema, which allows no field that it does not name.
+//! Results and rows against the documented JSON Schema, which is generated from their types and allows no other field.
 
 use std::path::Path;
 
@@ -7,19 +7,75 @@ use cuesta::bench::Case;
 use cuesta::bench::goal::Goal;
 use cuesta::bench::journal::ROWS;
 use cuesta::bench::results::{self, RESULTS, Results, TABLE};
-use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary};
+use cuesta::bench::rows::{ErrorRow, Errors, Row};
+use cuesta::measure::summary::Summary;
 use cuesta::renamed;
-use serde_json::Value;
+use schemars::generate::SchemaSettings;
+use serde_json::{Value, json};
 
 use super::mock;
 
-/// The schema in the document, of results and of rows.
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/results-schema.md");
+/// Longest line of the document's schema, characters.
+const LINE: usize = 120;
+
+/// The JSON Schema of `results.json`, with that of a row under `$defs/Row`.
+fn generated() -> Value {
+    let mut generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    generator.subschema_for::<Row>();
+    let mut schema = generator.into_root_schema_for::<Results>().to_value();
+    close(&mut schema);
+    renamed::add_former_names(&mut schema);
+    schema
+}
+
+/// Forbids fields that an object's schema does not name and removes formats that JSON Schema does not define.
+fn close(schema: &mut Value) {
+    if let Value::Object(keywords) = schema {
+        if keywords.contains_key("properties") {
+            keywords.insert("additionalProperties".to_string(), json!(false));
+        }
+        if keywords.get("format").is_some_and(Value::is_string) {
+            keywords.shift_remove("format");
+        }
+        keywords.values_mut().for_each(close);
+    } else if let Value::Array(items) = schema {
+        items.iter_mut().for_each(close);
+    }
+}
+
+/// Writes a value on one line if it fits, and its parts on lines of their own if not.
+fn layout(value: &Value, indent: usize, begin: &str) -> String {
+    let (pad, line) = (" ".repeat(indent), value.to_string());
+    let inner = |key: String, value: &Value| layout(value, indent + 2, &key);
+    let (open, parts, close) = match value {
+        _ if pad.len() + begin.len() + line.len() < LINE => return format!("{pad}{begin}{line}"),
+        Value::Object(fields) => ('{', fields.iter().map(|(key, v)| inner(format!("\"{key}\": "), v)).collect(), '}'),
+        Value::Array(items) => ('[', items.iter().map(|v| inner(String::new(), v)).collect(), ']'),
+        _ => return format!("{pad}{begin}{line}"),
+    };
+    let parts: Vec<String> = parts;
+    format!("{pad}{begin}{open}\n{}\n{pad}{close}", parts.join(",\n"))
+}
+
+#[test]
+fn the_document_holds_the_generated_schema() {
+    let text = std::fs::read_to_string(DOCUMENT).unwrap();
+    let (before, rest) = text.split_once("```json\n").expect("a JSON Schema");
+    let (_, after) = rest.split_once("```").expect("its end");
+    let expected = format!("{before}```json\n{}\n```{after}", layout(&generated(), 0, ""));
+    if std::env::var_os("UPDATE_SCHEMA").is_some() {
+        std::fs::write(DOCUMENT, expected).unwrap();
+    } else {
+        assert!(text == expected, "{DOCUMENT} is out of date: UPDATE_SCHEMA=1 rewrites it");
+    }
+}
+
+/// The generated schema, of results and of rows.
 fn schemas() -> (Schemas, [SchemaIndex; 2]) {
-    let text = include_str!("../../docs/results-schema.md");
-    let json = text.split("```json").nth(1).and_then(|rest| rest.split("```").next()).expect("a JSON Schema");
     let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
-    compiler.add_resource("results.json", serde_json::from_str(json).expect("JSON")).expect("a schema");
-    let places = ["results.json", "results.json#/$defs/row"];
+    compiler.add_resource("results.json", generated()).expect("a schema");
+    let places = ["results.json", "results.json#/$defs/Row"];
     let compiled = places.map(|at| compiler.compile(at, &mut schemas).expect("a valid schema"));
     (schemas, compiled)
 }
@@ -63,7 +119,7 @@ fn what_is_not_as_documented_is_found() {
     benchmark(folder.path());
     let (schemas, [whole, _]) = schemas();
     let value: Value = serde_json::from_str(&text(folder.path(), RESULTS)).unwrap();
-    let changes: [fn(&mut Value); 8] = [
+    let changes: [fn(&mut Value); 12] = [
         |v| v["schema"] = 2.into(),
         |v| v["cases"][0]["case"]["metric"] = "other".into(),
         |v| v["cases"][0]["rounds"][0]["hitches"] = (-1).into(),
@@ -72,6 +128,10 @@ fn what_is_not_as_documented_is_found() {
         |v| v["cases"][11]["case"]["goal"]["frame_ms"] = 1.into(),
         |v| v["cases"][11]["rounds"][0]["budget"]["settled"] = 1.5.into(),
         |v| v["header"]["machine"].as_object_mut().unwrap().clear(),
+        |v| v["cases"][0]["rounds"][0]["tolerances_px"] = json!([0.0]),
+        |v| v["cases"][0]["rounds"][0]["tolerance_scale"] = 0.5.into(),
+        |v| v["cases"][0]["errors"]["error_px"]["max"] = "huge".into(),
+        |v| v["cases"][0]["errors"]["within"]["samples"] = (-0.1).into(),
     ];
     for (k, change) in changes.iter().enumerate() {
         let mut changed = value.clone();

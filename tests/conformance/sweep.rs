@@ -10,14 +10,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cuesta::cli::whole::Whole;
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
+use cuesta::draw::DrawList;
 use cuesta::height::{self, Field, Options, synth};
-use cuesta::lod::{self, Entry, Settings, Technique, geomipmap};
+use cuesta::lod::{self, Settings};
 use cuesta::stress::invariants::{INVARIANTS, Subject};
 use cuesta::stress::sweep::{self, SweepCase, random, shrink};
 use cuesta::stress::views;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
+
+use crate::altered::BLOCK_LOST;
 
 /// Default number of cases: about two minutes on two cores.
 const CASES: u64 = 9000;
@@ -148,36 +150,6 @@ fn flat_fields_take_few_triangles() {
         assert!(list.triangles() <= max, "{size:?}: {} triangles", list.triangles());
     }
 }
-
-/// Geomipmap without its last block.
-struct BlockLost(Box<dyn Technique>);
-
-impl Technique for BlockLost {
-    fn resident(&self) -> &Geometry {
-        self.0.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.0.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.0.select(view, list);
-        if let Some(draw) = list.draws.last_mut() {
-            draw.instances.end -= 1;
-        }
-    }
-    fn keeps_tolerance(&self) -> bool {
-        true
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        self.0.pipeline_requirements()
-    }
-}
-
-static BLOCK_LOST: Entry = Entry {
-    name: "block-lost",
-    build: |field, settings| Box::new(BlockLost((geomipmap::ENTRY.build)(field, settings))),
-    ..geomipmap::ENTRY
-};
 
 #[test]
 fn broken_techniques_are_detected_and_shrunk() {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use cuesta::bench::paths;
-use cuesta::draw::{DepthMode, DrawList, Geometry, Limits, PipelineRequirements};
+use cuesta::draw::{DepthMode, DrawList};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -13,6 +13,7 @@ use cuesta::scene::{Copy, Scene, SceneRenderer};
 use cuesta::view::{Metric, Tolerance, View};
 
 use super::{aslant, mountains, on_device, render, technique};
+use crate::altered::Altered;
 
 const SIZE: [u32; 2] = [96, 64];
 
@@ -26,24 +27,8 @@ pub(super) fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Techn
 }
 
 /// A technique's lists drawn without a depth buffer.
-struct Painted(Box<dyn Technique>);
-
-impl Technique for Painted {
-    fn resident(&self) -> &Geometry {
-        self.0.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.0.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.0.select(view, list);
-    }
-    fn keeps_tolerance(&self) -> bool {
-        self.0.keeps_tolerance()
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        PipelineRequirements { depth_mode: DepthMode::Painter, ..self.0.pipeline_requirements() }
-    }
+fn painted(technique: Box<dyn Technique>) -> Box<dyn Technique> {
+    Altered::requirements(technique, |requirements| requirements.depth_mode = DepthMode::Painter)
 }
 
 /// Returns the bytes of all depth buffers.
@@ -69,7 +54,7 @@ fn images_without_a_depth_buffer_are_equal_on_all_paths() {
             let mut drawn: [Box<dyn Technique>; 3] = [
                 sorted(&[level, "order=front"]),
                 sorted(&[level, "order=painter"]),
-                Box::new(Painted(sorted(&[level, "order=front"]))),
+                painted(sorted(&[level, "order=front"])),
             ];
             let mut stages = drawn.each_ref().map(|technique| renderer(gpu, &field, technique.as_ref(), SIZE));
             for path in paths::PATHS {

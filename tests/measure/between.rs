@@ -57,7 +57,7 @@ fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     assert!(pop(&lists).max_px > 0.5 && pop(&lists) == pop(&finer));
     let depth = vec![0.0; 320 * 200];
     let [sizes, sizes_finer] =
-        [&lists, &finer].map(|lists| economy::economy(&field, &views[1], resident, &lists[1], &depth));
+        [&lists, &finer].map(|lists| economy::triangles(&field, &views[1], resident, &lists[1], &depth));
     assert_eq!(sizes, sizes_finer);
     let [proof, proof_finer] = [&lists, &finer].map(|lists| {
         let proof =
@@ -68,7 +68,7 @@ fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     assert_eq!(proof, proof_finer);
 }
 
-/// Whether a triangle has a corner somewhere, and which.
+/// Returns the index of a triangle's corner at a position, if any.
 fn corner_at(triangle: &Drawn, at: [i32; 2]) -> Option<usize> {
     triangle.corners.iter().position(|c| [c.x, c.z] == at)
 }

@@ -25,8 +25,8 @@ fn real(file: &str) -> Option<Arc<Field>> {
     Some(Arc::new(height::load(&path, &Options::default()).expect("a file that other tests read").field))
 }
 
-/// Flies every path over every field in so many frames each: frames, triangles in all, and the largest error found
-/// over the tolerance.
+/// Flies every path over every field. Returns the number of frames and triangles, and the largest error over the
+/// tolerance.
 fn fly(frames: usize, name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
     let (mut proven, mut triangles, mut largest) = (0, 0, 0.0f64);
     for (file, field) in FILES.iter().filter_map(|file| Some((file, real(file)?))) {

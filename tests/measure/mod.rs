@@ -24,7 +24,7 @@ fn technique(field: &Arc<Field>, name: &str, settings: &[(&str, &str)]) -> Box<d
     (entry.build)(Arc::clone(field), &Settings::new(entry, None, &settings).expect("the table's own values"))
 }
 
-/// What a technique draws in a view.
+/// Returns the triangles that a technique draws in a view.
 fn select(technique: &mut dyn Technique, view: &View) -> DrawList {
     let mut list = DrawList::default();
     technique.select(view, &mut list);

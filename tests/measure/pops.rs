@@ -44,7 +44,7 @@ fn heights(triangles: &[Drawn]) -> HashMap<[u32; 2], f64> {
     heights
 }
 
-/// What the meter finds from frame to frame, and the largest displacement by hand.
+/// Returns the measured pops from frame to frame, and the largest displacement computed by hand.
 fn journey(settings: &[(&str, &str)]) -> Vec<(Pop, f64)> {
     let field = terrain();
     let mut technique = technique(&field, "geomipmap", settings);
@@ -69,7 +69,7 @@ fn jumps_are_those_found_by_hand_and_morphing_has_fewer() {
         let pops = journey(&[("block", "17"), ("morph", morph)]);
         for (k, (found, by_hand)) in pops.iter().enumerate() {
             assert!((found.max_px - by_hand).abs() < 1e-9, "frame {k}: {} px, by hand {by_hand}", found.max_px);
-            assert!(found.samples > 1000 && found.histogram.total() == found.samples && found.p99_px <= found.max_px);
+            assert!(found.histogram.total() > 1000 && found.p99_px <= found.max_px);
         }
         pops.iter().map(|(found, _)| found.max_px).fold(0.0, f64::max)
     });

@@ -1,4 +1,4 @@
-//! The oracle against a check written another way: rays cast at the drawn triangles in world space, and both ends
+//! The measured errors against an independent check: rays cast at the drawn triangles in world space, and both ends
 //! projected without the crate's own matrices.
 
 use std::sync::Arc;
@@ -53,7 +53,7 @@ fn random_view(random: &mut Random) -> View {
     }
 }
 
-/// Where a ray straight down from above a point meets a triangle (Möller and Trumbore 1997).
+/// Returns the point where a vertical ray from above meets a triangle (Möller and Trumbore 1997).
 fn meets(at: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let from = at.with_y(a.y.max(b.y).max(c.y) + 1.0);
     let (ab, ac) = (b - a, c - a);
@@ -112,8 +112,8 @@ fn is_parallel(view: &View) -> bool {
     matches!(view.lens, Lens::Orthographic { .. })
 }
 
-/// Whether, of the triangles of a sample with a neighbour along x and one along z, some face the eye and some do
-/// not: by their normals.
+/// Returns true if, of the triangles of a sample with a neighbour along x and one along z, some face the eye and some do
+/// not, by their normals.
 fn turns_away(field: &Field, view: &View, i: u32, j: u32) -> bool {
     let [w, h] = field.size();
     let here = field.world(i, j);
@@ -129,11 +129,11 @@ fn turns_away(field: &Field, view: &View, i: u32, j: u32) -> bool {
     facing.contains(&true) && facing.contains(&false)
 }
 
-fn agree(what: &str, summary: Summary, values: impl Iterator<Item = f64>) {
+fn agree(what: &str, (count, summary): (u64, Summary), values: impl Iterator<Item = f64>) {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let n = values.len();
-    assert_eq!(summary.count, n as u64, "{what}: samples");
+    assert_eq!(count, n as u64, "{what}: samples");
     if n == 0 {
         return;
     }
@@ -161,12 +161,14 @@ fn compare(name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
         }
         let narrow = View { tolerance: Tolerance { px: view.tolerance.px / 4.0, ..view.tolerance }, ..view };
         let errors = geometric::errors(&field, &narrow, technique.resident(), &list);
-        agree("m", errors.vertical_m, rays.iter().map(|s| s.vertical_m));
-        agree("px", errors.screen_px, rays.iter().map(|s| s.screen_px));
-        agree("band, px", errors.silhouette_px, rays.iter().filter(|s| s.silhouette).map(|s| s.screen_px));
+        agree("m", (errors.samples, errors.vertical_m), rays.iter().map(|s| s.vertical_m));
+        agree("px", (errors.samples, errors.screen_px), rays.iter().map(|s| s.screen_px));
+        let in_band = rays.iter().filter(|s| s.silhouette);
+        agree("band, px", (errors.silhouette_samples, errors.silhouette_px), in_band.map(|s| s.screen_px));
         for bin in 0..ANGLES {
             let in_bin = rays.iter().filter(|s| (s.off_axis_degrees / 10.0) as usize == bin);
-            agree("of τ, by angle", errors.off_axis[bin], in_bin.map(|s| s.screen_px / narrow.tolerance.px));
+            let found = (errors.off_axis_samples[bin], errors.off_axis[bin]);
+            agree("of τ, by angle", found, in_bin.map(|s| s.screen_px / narrow.tolerance.px));
         }
         let kept = rays.iter().filter(|s| s.screen_px <= narrow.tolerance.px).count() as f64 / rays.len() as f64;
         assert!((errors.bound_kept - kept).abs() < 1e-12, "kept {} against {kept}", errors.bound_kept);

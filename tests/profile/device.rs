@@ -1,4 +1,4 @@
-//! What only a device can show: counts and times of single draws.
+//! Tests that need a device: counts and times of single draws.
 
 use std::sync::Arc;
 
@@ -162,7 +162,7 @@ fn measure(gpu: &Arc<Gpu>, frames: u32) -> (Profile, serde_json::Value) {
     (measured.profile, measured.trace)
 }
 
-/// Whether all of a slice lies within another.
+/// Returns true if a slice lies within another.
 fn holds(outer: &Slice, inner: &Slice) -> bool {
     outer.track == inner.track && outer.ns[0] <= inner.ns[0] && inner.ns[1] <= outer.ns[1]
 }

@@ -1,4 +1,4 @@
-//! What the page and the figures hold.
+//! Contents of the page and the figures.
 
 use std::fs;
 use std::path::Path;
@@ -149,7 +149,7 @@ fn published_figures_stand_beside_ours() {
     assert!(page.contains("not in this run"), "clusters are not in this run");
 }
 
-/// What was published of making triangles alone stands beside the host's share of the fastest selection.
+/// Published times of triangle generation alone are compared with the host's share of the fastest selection.
 #[test]
 fn published_generation_stands_beside_selection() {
     let folder = tempfile::tempdir().unwrap();

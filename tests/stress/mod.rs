@@ -1,41 +1,17 @@
 //! Tests of the stress suite: it finds broken techniques, reports where they fail and saves counter-examples.
 
-use std::sync::Arc;
-
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
-use cuesta::height::{Field, Options, load};
-use cuesta::lod::{Entry, Settings, Technique, geomipmap};
+use cuesta::draw::{DrawList, Geometry, Limits};
+use cuesta::height::{Options, load};
+use cuesta::lod::{Entry, Technique, geomipmap};
 use cuesta::stress::jitter::{Jitter, LIMIT_PX, VertexPlacement};
 use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
 use cuesta::stress::{Case, CaseRun, Finding, Kind, TechniqueConfig, cases, forms, saved};
 use cuesta::view::View;
 
-/// A mutant of GeoMipMapping that does not draw its last block.
-struct DropsLastBlock(Box<dyn Technique>);
+use crate::altered::BLOCK_LOST;
 
 /// A mutant that panics in every view.
 struct Panics(Geometry);
-
-impl Technique for DropsLastBlock {
-    fn resident(&self) -> &Geometry {
-        self.0.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.0.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.0.select(view, list);
-        if let Some(draw) = list.draws.last_mut() {
-            draw.instances.end -= 1;
-        }
-    }
-    fn keeps_tolerance(&self) -> bool {
-        true
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        self.0.pipeline_requirements()
-    }
-}
 
 impl Technique for Panics {
     fn resident(&self) -> &Geometry {
@@ -52,11 +28,6 @@ impl Technique for Panics {
     }
 }
 
-fn drops_last_block(field: Arc<Field>, settings: &Settings) -> Box<dyn Technique> {
-    Box::new(DropsLastBlock((geomipmap::ENTRY.build)(field, settings)))
-}
-
-static DROPS_LAST_BLOCK: Entry = Entry { name: "block-lost", build: drops_last_block, ..geomipmap::ENTRY };
 static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 
@@ -76,7 +47,7 @@ fn failed(run: &CaseRun) -> Vec<Finding> {
 #[test]
 fn a_dropped_block_is_found_in_terrains_and_flights_and_saved() {
     for name in ["prime sides, 131 x 67", "back again in mid-morph"] {
-        let run = CaseRun { case: case(name), config: Some(config(&DROPS_LAST_BLOCK)) };
+        let run = CaseRun { case: case(name), config: Some(config(&BLOCK_LOST)) };
         let failed = failed(&run);
         let finding =
             failed.iter().find(|finding| finding.check.starts_with("one surface")).expect("a surface with a gap");

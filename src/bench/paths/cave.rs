@@ -6,20 +6,20 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::ground::Ground;
+use super::pose::{Opening, Pose};
 use super::shapes::{along, angles};
-use super::{Opening, Pose};
 
-/// About so many places along a side are looked at.
+/// Approximate number of places examined along a side.
 const PLACES: u32 = 512;
 /// The way goes where there is this part of the most room, at least.
 const MIN_ROOM: f64 = 0.3;
-/// Corners of the way are means of so many places before and behind.
+/// Number of places before and behind over which corners of the path are averaged.
 const SMOOTHED: usize = 6;
-/// How far ahead the eye looks, as a part of the way.
+/// Distance at which the eye looks ahead, as a share of the path.
 const AHEAD: f64 = 0.02;
-/// Where the eye is between floor and ceiling.
+/// Height of the eye between floor (0) and ceiling (1).
 const MIDDLE: f64 = 0.5;
-/// How near it may come to either.
+/// Smallest distance from either.
 const NEAREST: f64 = 0.25;
 
 /// See [`PATHS`](super::PATHS).

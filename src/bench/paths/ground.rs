@@ -4,7 +4,7 @@ use crate::height::Field;
 
 /// A height above ground that shows a valley and its flanks, metres.
 const ALTITUDE_M: f64 = 300.0;
-/// Where a person's eyes are, metres above ground.
+/// Eye height of a person, metres above ground.
 const EYE_M: f64 = 1.7;
 
 /// A field as something to fly over.

@@ -4,44 +4,23 @@
 mod cave;
 mod ground;
 mod peers;
+mod pose;
 mod shapes;
 
-use glam::DVec3;
-
 use crate::height::Field;
-use crate::view::{Lens, Tolerance, View};
+use crate::view::{Tolerance, View};
 use ground::Ground;
+
+pub use pose::{Opening, Pose};
 
 /// Time that a frame stands for, seconds.
 pub const TIME_STEP_S: f64 = 1.0 / 60.0;
-
-/// One pose of a path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
-    /// World metres.
-    pub eye: DVec3,
-    /// Heading, degrees: 0 = east, 90 = south.
-    pub yaw: f64,
-    /// Degrees above the horizon.
-    pub pitch: f64,
-    /// How wide the view is.
-    pub opening: Opening,
-}
-
-/// Field of view, degrees.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Opening {
-    /// From the left to the right border.
-    Horizontal(f64),
-    /// From the upper to the lower border.
-    Vertical(f64),
-}
 
 /// One line of [`PATHS`].
 pub struct Path {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// Description in one sentence.
     pub about: &'static str,
     poses: fn(&Ground, usize) -> Vec<Pose>,
 }
@@ -89,28 +68,6 @@ pub fn views(poses: &[Pose], near: f64, size: [u32; 2], tolerance: Tolerance) ->
     let view =
         |(k, pose): (u32, &Pose)| View { time_s: f64::from(k) * TIME_STEP_S, ..pose.view(size, near, tolerance) };
     (0..).zip(poses).map(view).collect()
-}
-
-impl Pose {
-    /// The view from here.
-    pub fn view(&self, size: [u32; 2], near: f64, tolerance: Tolerance) -> View {
-        let fov_x = match self.opening {
-            Opening::Horizontal(degrees) => degrees.to_radians(),
-            Opening::Vertical(degrees) => {
-                let slope = (degrees.to_radians() / 2.0).tan() * f64::from(size[0]) / f64::from(size[1]);
-                2.0 * slope.atan()
-            }
-        };
-        View {
-            eye: self.eye,
-            world_from_eye: View::turned(self.yaw, self.pitch, 0.0),
-            lens: Lens::Perspective { fov_x },
-            size,
-            near,
-            tolerance,
-            time_s: 0.0,
-        }
-    }
 }
 
 #[cfg(test)]

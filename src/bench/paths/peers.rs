@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::ground::Ground;
-use super::{Opening, Pose};
+use super::pose::{Opening, Pose};
 
 /// Ends of the line, samples.
 const FROM: [f64; 2] = [300.0, 300.0];

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::ground::Ground;
-use super::{Opening, Pose};
+use super::pose::{Opening, Pose};
 
 /// Field of view where a path does not say otherwise.
 const OPENING: Opening = Opening::Horizontal(60.0);

@@ -1,4 +1,4 @@
-//! How far the as-drawn triangles are from the samples: vertically in metres, and on the screen in pixels.
+//! Distance of the drawn triangles from the samples: vertically in metres, and on the screen in pixels.
 //!
 //! Measured is every sample with data inside or on the border of a drawn triangle, if the drawn point above
 //! or below it is in view. The screen error is exact: both end points of the vertical difference are projected
@@ -13,9 +13,11 @@
 
 mod silhouette;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::silhouette::Silhouette;
+use super::extended::{self, Extended};
 use super::projection::Projection;
 use super::summary::Tally;
 pub use super::summary::{Place, Summary};
@@ -28,33 +30,60 @@ use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::view::{Aabb, Containment, Frustum, Projected, View};
 use glam::DVec3;
 
-/// Bins of the angle off the view axis, 10° each: a perspective picture ends before 90°.
+/// Number of bins of the angle off the view axis: a perspective picture ends before 90°.
 pub const ANGLES: usize = 9;
+/// Width of such a bin, degrees.
+pub const ANGLE_DEG: f64 = 10.0;
 
-/// What [`errors`] finds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Screen error divided by the tolerance, in one range of angles off the view axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
+pub struct AngleBin {
+    /// Smallest angle, degrees, inclusive.
+    pub from_deg: f64,
+    /// Largest angle, degrees, exclusive.
+    pub to_deg: f64,
+    /// 99.9th percentile.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
+    pub p999: f64,
+    /// Largest value.
+    #[serde(with = "extended")]
+    #[schemars(with = "Extended")]
+    pub max: f64,
+}
+
+/// Errors of one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Drawn surface − sample, absolute, metres.
+    /// Samples measured.
+    pub samples: u64,
+    /// Vertical distance of the drawn surface from the sample, metres.
     pub vertical_m: Summary,
-    /// The same difference on the screen, pixels.
+    /// Distance of the same two points on the screen, pixels.
     pub screen_px: Summary,
-    /// Share of the samples counted in `screen_px` whose error is at most the view's tolerance; 1 if there are
-    /// none.
+    /// Share of the samples whose screen error is at most the view's tolerance; 1 without samples.
     pub bound_kept: f64,
-    /// The screen error of the samples in the silhouette band alone, pixels: of the four triangles that such a
-    /// sample makes with a neighbour along x and one along z, some face the eye and some do not.
+    /// Samples in the silhouette band.
+    pub silhouette_samples: u64,
+    /// Screen error in the silhouette band, pixels. A sample lies in the band if some of the four triangles that it
+    /// makes with a neighbour along x and one along z face the eye and others do not.
     pub silhouette_px: Summary,
-    /// Screen error ÷ the view's tolerance, by the angle of the drawn point off the view axis: bin k is from
-    /// 10·k up to 10·(k + 1) degrees. All rays of an orthographic view are in bin 0.
+    /// Samples by the angle of the drawn point off the view axis: bin k spans [`ANGLE_DEG`]·k to [`ANGLE_DEG`]·(k + 1).
+    /// All rays of an orthographic view are in bin 0.
+    pub off_axis_samples: [u64; ANGLES],
+    /// Screen error divided by the view's tolerance, in the same bins.
     pub off_axis: [Summary; ANGLES],
-    /// Where the vertical error is largest; `None` if nothing is in view or nothing is wrong.
+    /// Place of the largest vertical error; `None` if nothing is in view or no error is above 0.
     pub vertical_at: Option<Place>,
-    /// Where the screen error is largest.
+    /// Place of the largest screen error.
     pub screen_at: Option<Place>,
 }
 
-/// Measures the triangles of a list; in a cave those that face down against its ceiling. Time is linear in triangles and samples; memory is bounded by a
-/// few thousandths of the field's samples for each of 64 pieces of work.
+/// Measures the triangles of a list; in a cave, those that face down against its ceiling.
+///
+/// Time is linear in triangles and samples. Memory is bounded by a few thousandths of the field's samples for each of 64
+/// parallel parts.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
     let ruler = Ruler::new(field, view, list.fraction_bits);
     let mut total = ruler.tallies();
@@ -62,7 +91,7 @@ pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) 
     total.errors(view.tolerance.px)
 }
 
-/// What is summed up.
+/// Sums over samples.
 struct Tallies {
     vertical: Tally,
     screen: Tally,
@@ -83,10 +112,13 @@ impl Tallies {
 
     fn errors(&self, tolerance_px: f64) -> Errors {
         Errors {
+            samples: self.screen.count,
             vertical_m: self.vertical.summary(),
             screen_px: self.screen.summary(),
             bound_kept: 1.0 - self.beyond as f64 / self.screen.count.max(1) as f64,
+            silhouette_samples: self.silhouette.count,
             silhouette_px: self.silhouette.summary(),
+            off_axis_samples: self.off_axis.each_ref().map(|bin| bin.count),
             off_axis: self.off_axis.each_ref().map(|bin| bin.summary().in_units_of(tolerance_px)),
             vertical_at: self.vertical.largest_at,
             screen_at: self.screen.largest_at,
@@ -94,12 +126,12 @@ impl Tallies {
     }
 }
 
-/// What triangles are measured with.
+/// Data for measuring triangles.
 struct Ruler<'a> {
     field: &'a Field,
-    /// What triangles that face up are held against.
+    /// Reference for triangles that face up.
     floor: Truth<'a>,
-    /// What those that face down are, in a cave.
+    /// Reference for triangles that face down, in a cave.
     ceiling: Option<Truth<'a>>,
     tolerance_px: f64,
     fraction_bits: u32,
@@ -133,7 +165,7 @@ impl<'a> Ruler<'a> {
             frame: Frame::placing(field, view),
             frustum: view.frustum(),
             projection: Projection::new(view),
-            bin_ends: std::array::from_fn(|k| (10.0 * (k + 1) as f64).to_radians().cos().powi(2)),
+            bin_ends: std::array::from_fn(|k| (ANGLE_DEG * (k + 1) as f64).to_radians().cos().powi(2)),
         }
     }
 
@@ -202,9 +234,10 @@ fn bounds(field: &Field, triangle: &Triangle, fraction_bits: u32) -> Aabb {
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
 }
 
-/// Whether the triangle is the one that counts a sample inside it or on its border: the one that holds the
-/// sample moved by (ε, ε²) for an infinitely small ε, towards the inside of the field. The triangle's corners have so many
-/// fraction bits.
+/// Returns true if a triangle counts a sample inside it or on its border.
+///
+/// Of all triangles around a sample, that one holds the sample moved by (ε, ε²) towards the inside of the field, for an
+/// infinitely small ε. Corners have `fraction_bits` fraction bits.
 pub(super) fn owns(triangle: &Triangle, fraction_bits: u32, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
     let towards = [if x < last[0] { 1 } else { -1 }, if z < last[1] { 1 } else { -1 }];
     let [a, b, c] = *triangle;

@@ -1,4 +1,4 @@
-//! Which samples lie in the silhouette band, where the land turns away from the eye.
+//! The silhouette band: samples where the terrain turns away from the eye.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use crate::height::Field;
 use crate::measure::summary::Place;
 use crate::view::{Lens, View};
 
-/// Tells the band from the rest of a field in a view.
+/// Test for the silhouette band of a field in a view.
 pub struct Silhouette<'a> {
     field: &'a Field,
     last: [u32; 2],
@@ -18,7 +18,7 @@ pub struct Silhouette<'a> {
 }
 
 impl<'a> Silhouette<'a> {
-    /// For a field in a view.
+    /// Prepares the test for a field in a view.
     pub fn new(field: &'a Field, view: &View) -> Self {
         let last = field.size().map(|n| n - 1);
         let is_perspective = matches!(view.lens, Lens::Perspective { .. });
@@ -26,9 +26,11 @@ impl<'a> Silhouette<'a> {
         Self { field, last, per_metre, is_perspective, eye: view.eye, backward: -view.forward() }
     }
 
-    /// Whether the land's facing changes at the sample: a plane through it with slopes (a, b) along x and z
-    /// faces the eye, which lies at (u, y, v) from the sample, if y − a·u − b·v > 0. Each slope is one of two,
-    /// towards either neighbour; at the field's border, and beside a hole as filled, the one there is.
+    /// Returns true if the silhouette passes through the sample.
+    ///
+    /// A plane through the sample with slopes (a, b) along x and z faces an eye at (u, y, v) from it if
+    /// y − a·u − b·v > 0. Each slope is one of two, towards either neighbour, or the only one at the field's border.
+    /// Holes count as filled.
     pub fn passes(&self, place: &Place) -> bool {
         let to_eye = if self.is_perspective { self.eye - place.truth } else { self.backward };
         let [x, z] = place.sample;

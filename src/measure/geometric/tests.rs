@@ -47,7 +47,7 @@ fn every_sample_counts_once_and_the_summary_is_exact() {
     expected.sort_by(f64::total_cmp);
     let n = expected.len();
     let rms = (expected.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
-    assert_eq!(measured.vertical_m.count, n as u64);
+    assert_eq!(measured.samples, n as u64);
     assert!((measured.vertical_m.rms - rms).abs() < 1e-12 * rms);
     assert_eq!(measured.vertical_m.p999, expected[(n * 999).div_ceil(1000) - 1]);
     assert_eq!(measured.vertical_m.max, expected[n - 1]);
@@ -67,7 +67,7 @@ fn only_what_is_in_view_counts() {
     let drawn = |k: u32| field.world_at((k % 61).into(), (k / 61).into(), 20.0);
     let seen = (0..61 * 47).filter(|&k| in_view(&view, drawn(k))).count();
     assert!(seen > 100 && seen < 61 * 47 / 2, "{seen}");
-    assert_eq!(measured.vertical_m.count, seen as u64);
+    assert_eq!(measured.samples, seen as u64);
 }
 
 #[test]
@@ -83,5 +83,5 @@ fn truth_at_the_eye_is_infinitely_far_and_before_the_near_plane_is_not() {
     assert_eq!(measured.screen_px.max, f64::INFINITY);
     view.eye.y = -0.5;
     let measured = errors(&field, &view, &Geometry::default(), &list);
-    assert!(measured.screen_px.count > 0 && measured.screen_px.max.is_finite(), "{measured:?}");
+    assert!(measured.samples > 0 && measured.screen_px.max.is_finite(), "{measured:?}");
 }

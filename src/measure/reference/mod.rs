@@ -16,17 +16,32 @@
 mod rtin;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::facing_up;
+use super::{extended, facing_up};
 use crate::height::surface::{self, Corner, Triangle};
 use crate::height::{Field, Holes, Samples};
 
 /// Most cells along a side of a greedy mesh.
 pub const TILE: u32 = 1024;
 
+/// Near-optimal meshes of a whole field within a vertical error, and a technique against them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = extended::non_negative)]
+pub struct Reference {
+    /// Largest vertical error of both meshes, metres.
+    pub error_m: f64,
+    /// Triangles of the greedy Delaunay mesh.
+    pub delaunay: Option<u64>,
+    /// Triangles of the right-triangulated irregular network.
+    pub rtin: Option<u64>,
+    /// The technique's triangles over the greedy mesh's, both over the terrain in view.
+    pub multiple: Option<f64>,
+}
+
 /// A mesh within an error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mesh {
     /// Triangles.
     pub triangles: u64,
@@ -36,7 +51,7 @@ pub struct Mesh {
     pub tiles: [u32; 2],
 }
 
-/// Why there is no reference.
+/// Reason for a missing reference.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The error asked for, metres, cannot be one.
@@ -47,7 +62,7 @@ pub enum Error {
     Tile {
         /// The tile's first sample.
         at: [u32; 2],
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
 }
@@ -82,7 +97,7 @@ fn check(tolerance_m: f64) -> Result<(), Error> {
     if allowed { Ok(()) } else { Err(Error::Tolerance(tolerance_m)) }
 }
 
-/// Where a side of so many cells is cut: evenly, into pieces of at most [`TILE`].
+/// Returns the cuts of a side with this many cells: even pieces of at most [`TILE`] cells.
 fn seams(cells: u32) -> Vec<u32> {
     let pieces = cells.div_ceil(TILE);
     (0..=pieces).map(|k| (u64::from(cells) * u64::from(k) / u64::from(pieces)) as u32).collect()

@@ -102,7 +102,7 @@ impl<'a> Rtin<'a> {
         Corner { x, z, y }
     }
 
-    /// Whether some of a triangle's area lies on the field: no side of either parts them.
+    /// Returns true if some of a triangle's area lies on the field: no side of either separates them.
     fn meets_field(&self, triangle: [[i32; 2]; 3]) -> bool {
         let at = |[x, z]: [i32; 2]| Corner { x, z, y: 0.0 };
         let [a, b, c]: Triangle = facing_up(&triangle.map(at));
@@ -130,7 +130,7 @@ impl<'a> Rtin<'a> {
         self.split[word] & bit != 0
     }
 
-    /// Whether the position was not marked before.
+    /// Returns true if the position was not marked before.
     fn mark(&mut self, at: [i32; 2]) -> bool {
         let (word, bit) = self.bit(at);
         let new = self.split[word] & bit == 0;

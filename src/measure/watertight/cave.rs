@@ -6,16 +6,18 @@
 //!    [module](super): one surface, covered once;
 //! 2. both lie over the same triangles in plan, and no vertex of the ceiling is below the floor's;
 //! 3. where a triangle has no neighbour, floor and ceiling have the same edge: the same two ends in space. Elsewhere the
-//!    cave is open, and that may be at the rim of the field only, or out of sight.
+//!    cave is open, and that may be at the rim of the field only, or out of view.
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::{self, BorderEdge};
-use super::{CounterExample, Kind, faces_up, on_the_field, one_height_a_vertex, refuted, sweep};
+use super::sweep;
+use super::vertices::{faces_up, on_the_field, one_height_a_vertex};
 use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, doubled_area};
 use crate::view::{Aabb, Containment, Frustum};
 
-/// What was proven of a cave.
+/// Result of a cave's proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CaveProof {
     /// Triangles of the floor, and as many of the ceiling.
@@ -24,7 +26,7 @@ pub struct CaveProof {
     pub doubled_area: i64,
     /// Edges in which floor and ceiling meet.
     pub seam_edges: usize,
-    /// Edges at which the cave is open: at the field's rim or out of sight.
+    /// Edges at which the cave is open: at the field's rim or out of view.
     pub open_edges: usize,
 }
 
@@ -105,7 +107,7 @@ fn sorted(triangles: &[Drawn], border: Vec<BorderEdge>) -> Vec<(BorderEdge, [Cor
     ends
 }
 
-/// Whether a cave may be open at an edge: at the field's rim, or where it is out of sight.
+/// Returns true if a cave may be open at an edge: at the field's rim, or out of view.
 fn is_open(field: &Field, frustum: &Frustum, below: &[Corner; 2], above: &[Corner; 2]) -> bool {
     let last = field.size().map(|n| n as i32 - 1);
     let is_rim = |n: [i32; 2], last: i32| n == [0; 2] || n == [last; 2];

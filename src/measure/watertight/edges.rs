@@ -4,16 +4,16 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::{CounterExample, Kind, refuted};
+use super::counter_example::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 
 /// An edge of a triangle that no other triangle uses the other way round. The land is to the left of it, seen
 /// from above with north up: an edge that runs south has it to the east.
 #[derive(Clone, Copy, Debug)]
 pub struct BorderEdge {
-    /// Where it starts.
+    /// Start.
     pub from: [i32; 2],
-    /// Where it ends.
+    /// End.
     pub to: [i32; 2],
     /// Its triangle.
     pub triangle: u32,
@@ -113,8 +113,10 @@ pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), B
     Ok(())
 }
 
-/// A border whose edges' ends have so many fraction bits, in samples: edges that follow each other in one direction are
-/// one. Refuted if a line of it does not go from sample to sample.
+/// Converts a border with fraction bits to samples: consecutive edges in one direction become one.
+///
+/// # Errors
+/// If a line of the border does not go from sample to sample.
 pub fn between_samples(
     triangles: &[Drawn],
     border: Vec<BorderEdge>,

@@ -12,8 +12,8 @@
 //! 5. m is 0 outside the field and changes across the border only. A sweep over the rows follows the border
 //!    and shows that m is 0 or 1 everywhere: covered once, and the drawn area is the covered area;
 //! 6. where m is 0, every triangle of the samples' own surface that has data is outside the frustum: nothing
-//!    in sight is left out. The test is [`Frustum::contains`] on the triangle's own box, so that whoever culls
-//!    by boxes around the land passes, and nobody passes who culls what can be seen.
+//!    in view is left out. The test is [`Frustum::contains`] on the triangle's own box: culling by boxes around the
+//!    terrain passes, and culling of anything visible does not.
 //!
 //! What lies along a culled region or a hole is thus no matter of the border's shape but of what is missing
 //! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
@@ -21,66 +21,27 @@
 //! Surfaces with skirts have gaps between edges, which [`prove_with_skirts`] finds and shows hidden instead of 2 to 4.
 
 pub mod cave;
+pub mod counter_example;
 mod edges;
 pub mod plan;
 mod seams;
 mod sweep;
+mod vertices;
 
 use std::io::{self, Write};
-
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, Geometry, Seams};
 use crate::height::Field;
-use crate::height::surface::{self, Corner, Triangle, doubled_area};
+use crate::height::surface::{self, Triangle, doubled_area};
 use crate::view::{Frustum, View};
 
-/// What is wrong with a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Kind {
-    /// A corner lies outside the field.
-    Outside,
-    /// A triangle faces down.
-    Fold,
-    /// One vertex has two heights.
-    Crack,
-    /// Land is covered more than once.
-    Overlap,
-    /// A vertex of one triangle lies inside an edge of another.
-    TJunction,
-    /// Land with data, perhaps in sight, is not covered.
-    Gap,
-    /// One edge lies above another, and no skirt hides what is between them.
-    Seam,
-}
+pub use self::counter_example::{CounterExample, Kind};
+use self::vertices::{faces_up, on_the_field, one_height_a_vertex};
 
-/// The fewest triangles that show what is wrong.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CounterExample {
-    /// What is wrong.
-    pub kind: Kind,
-    /// The triangles at fault, as they were given; for a gap the samples' one that is missing.
-    pub triangles: Vec<Triangle>,
-    /// What is wrong with them, and where.
-    pub text: String,
-}
-
-impl std::fmt::Display for CounterExample {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{:?}: {}", self.kind, self.text)?;
-        self.triangles.iter().try_for_each(|[a, b, c]| {
-            write!(f, "; ({}, {}, {}) ({}, {}, {}) ({}, {}, {})", a.x, a.z, a.y, b.x, b.z, b.y, c.x, c.z, c.y)
-        })
-    }
-}
-
-impl std::error::Error for CounterExample {}
-
-/// What was proven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Result of a proof.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proof {
     /// Triangles.
     pub triangles: usize,
@@ -90,8 +51,7 @@ pub struct Proof {
     pub border_edges: usize,
 }
 
-/// Proves that triangles are one surface that leaves out nothing in sight. Takes about 100 bytes a triangle
-/// while it runs.
+/// Proves that triangles are one surface that leaves out nothing in view. Needs about 100 bytes a triangle.
 ///
 /// # Panics
 /// If the field has more than 2^24 samples a side, or there are more than 2^31 triangles.
@@ -99,8 +59,8 @@ pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Pr
     prove_between(field, frustum, triangles, 0)
 }
 
-/// The same of triangles whose corners have so many fraction bits. Their border must consist of straight lines between
-/// samples, wherever on those lines its vertices lie.
+/// Proves the same of triangles whose corners have `fraction_bits` fraction bits. Their border must consist of straight
+/// lines between samples; vertices may lie anywhere on these lines.
 ///
 /// # Panics
 /// If there are more than 2^31 triangles, or more than 2^24 parts of samples a side.
@@ -139,7 +99,7 @@ fn one_surface(
 }
 
 /// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
-/// skirt; and that they leave out nothing in sight. `skirts` are upright triangles ([`expand::skirts`]).
+/// skirt; and that they leave out nothing in view. `skirts` are upright triangles ([`expand::skirts`]).
 ///
 /// # Panics
 /// As [`prove`].
@@ -186,53 +146,7 @@ pub fn prove_list(
     }
 }
 
-/// A refutation by some of the triangles.
-fn refuted<T>(
-    kind: Kind,
-    triangles: &[Drawn],
-    guilty: impl IntoIterator<Item = u32>,
-    text: String,
-) -> Result<T, Box<CounterExample>> {
-    let guilty: Vec<&Drawn> = guilty.into_iter().map(|k| &triangles[k as usize]).collect();
-    let instances: Vec<_> = guilty.iter().map(|t| t.instance.to_string()).collect();
-    let text = format!("{text} (instances {})", instances.join(", "));
-    Err(Box::new(CounterExample { kind, triangles: guilty.iter().map(|t| t.corners).collect(), text }))
-}
-
-fn on_the_field(field: &Field, triangles: &[Drawn], fraction_bits: u32) -> Result<(), Box<CounterExample>> {
-    let [w, h] = field.size().map(|n| n as i32);
-    let [last_x, last_z] = [w, h].map(|n| (n - 1) << fraction_bits);
-    let outside = |c: &Corner| !(0..=last_x).contains(&c.x) || !(0..=last_z).contains(&c.z);
-    match triangles.iter().position(|t| t.corners.iter().any(outside)) {
-        Some(k) => refuted(Kind::Outside, triangles, [k as u32], format!("a corner outside {w} × {h} samples")),
-        None => Ok(()),
-    }
-}
-
-fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    match triangles.iter().position(|t| doubled_area(&t.corners) <= 0) {
-        Some(k) => refuted(Kind::Fold, triangles, [k as u32], "a triangle that does not face up".into()),
-        None => Ok(()),
-    }
-}
-
-fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    // Position, height, triangle as one number, which sorts fast.
-    let vertex = |corner: Corner, k: u32| {
-        let position = u128::from(edges::packed([corner.x, corner.z]));
-        position << 64 | u128::from(corner.y.to_bits()) << 32 | u128::from(k)
-    };
-    let mut vertices: Vec<u128> =
-        (0u32..).zip(triangles).flat_map(|(k, t)| t.corners.map(|corner| vertex(corner, k))).collect();
-    vertices.par_sort_unstable();
-    let differ = |[a, b]: &&[u128; 2]| a >> 64 == b >> 64 && a >> 32 != b >> 32;
-    let Some(&[a, b]) = vertices.array_windows().find(differ) else { return Ok(()) };
-    let [x, z] = edges::unpacked((a >> 64) as u64);
-    let [low, high] = [a, b].map(|v| f32::from_bits((v >> 32) as u32));
-    refuted(Kind::Crack, triangles, [a as u32, b as u32], format!("vertex ({x}, {z}) at both {low} m and {high} m"))
-}
-
-/// Writes triangles, whose corners have so many fraction bits, as ASCII PLY, world metres.
+/// Writes triangles, whose corners have `fraction_bits` fraction bits, as ASCII PLY, world metres.
 pub fn write_ply(field: &Field, triangles: &[Triangle], fraction_bits: u32, mut out: impl Write) -> io::Result<()> {
     writeln!(out, "ply\nformat ascii 1.0\ncomment metres: x east, y up, z south")?;
     writeln!(out, "element vertex {}", 3 * triangles.len())?;

@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage};
 
-use super::{CounterExample, Kind};
+use super::counter_example::{CounterExample, Kind};
 use crate::draw::expand::Drawn;
 use crate::height::surface::{Corner, Triangle, doubled_area};
 
@@ -64,7 +64,7 @@ impl Window {
         Self { first: [(west + east - side) / 2.0, (north + south - side) / 2.0], px_per_cell: f64::from(SIZE) / side }
     }
 
-    /// Where a corner lies in the picture, pixels.
+    /// Returns the position of a corner in the picture, pixels.
     fn at(&self, corner: &Corner) -> [f64; 2] {
         let along = |n: i32, first: f64| (f64::from(n) - first) * self.px_per_cell;
         [along(corner.x, self.first[0]), along(corner.z, self.first[1])]

@@ -9,8 +9,8 @@
 
 use rayon::prelude::*;
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::{self, BorderEdge};
-use super::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle};
@@ -25,7 +25,7 @@ type Heights = [f64; 2];
 #[derive(Clone, Copy)]
 struct Part {
     way: Way,
-    /// Whether the edge goes the other way.
+    /// True if the edge runs the other way.
     is_backward: bool,
     heights: Heights,
     triangle: u32,

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::BorderEdge;
-use super::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 use crate::height::surface::{Corner, is_terrain};
 use crate::height::{Field, rtin};
@@ -22,7 +22,7 @@ pub struct Strip {
     east: Line,
 }
 
-/// Where a line meets the band's northern and southern row.
+/// Intersections of a line with the band's northern and southern row.
 type Line = [Fraction; 2];
 
 /// An exact number.
@@ -75,7 +75,7 @@ impl Eq for Fraction {}
 struct Crossing {
     band: i32,
     line: Line,
-    /// Whether the land begins east of it.
+    /// True if terrain begins east of it.
     enters: bool,
     triangle: u32,
 }
@@ -122,7 +122,7 @@ fn crossings(edge: &BorderEdge) -> impl Iterator<Item = Crossing> + use<> {
 /// Open cells looked at together before each by itself.
 const RUN: i32 = 64;
 
-/// Refuted if land with data that may be in sight is not covered.
+/// Fails if terrain with data that may be in view is not covered.
 pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), Box<CounterExample>> {
     let bands = 0..field.size()[1] as i32 - 1;
     let missing = bands.into_par_iter().find_map_first(|band| {
@@ -138,7 +138,7 @@ pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), 
         })
     });
     let Some(triangle) = missing else { return Ok(()) };
-    let text = format!("terrain at {triangle:?} is neither covered nor out of sight");
+    let text = format!("terrain at {triangle:?} is neither covered nor out of view");
     let corners = triangle.map(|[x, z]| Corner { x, z, y: field.height(x as u32, z as u32) });
     Err(Box::new(CounterExample { kind: Kind::Gap, triangles: vec![corners], text }))
 }
@@ -162,7 +162,7 @@ impl Strip {
         (west as i32, east.max(west) as i32)
     }
 
-    /// Whether a triangle with corners on the two rows lies inside: its corners do, as strips are convex.
+    /// Returns true if a triangle with corners on the two rows lies inside: strips are convex, so its corners decide.
     fn contains(&self, triangle: &[[i32; 2]; 3]) -> bool {
         triangle.iter().all(|&[x, z]| {
             let row = (z - self.band) as usize;
@@ -171,7 +171,7 @@ impl Strip {
     }
 }
 
-/// Whether the box around samples is at least partly inside the frustum.
+/// Returns true if the box around samples is at least partly inside the frustum.
 fn may_be_seen(field: &Field, frustum: &Frustum, samples: impl IntoIterator<Item = [i32; 2]>) -> bool {
     let points = samples.into_iter().map(|[x, z]| field.world(x as u32, z as u32));
     let bounds = points.map(|p| Aabb { min: p, max: p }).reduce(|a, b| a.union(&b));

@@ -1,6 +1,7 @@
 //! Surfaces with one planted fault each.
 
 use super::*;
+use crate::height::surface::Corner;
 use crate::height::{Holes, Samples, rtin};
 use crate::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
