@@ -68,13 +68,13 @@ impl GpuTileCache {
         (self.staging[0].size / self.tile_bytes) as usize
     }
 
-    /// Records the filling of slots: before the target begins.
+    /// Records the copies of tiles to their slots, before rendering begins.
     ///
     /// # Panics
     /// If there are more than [`Self::max_fills`], or texels of another size.
-    pub fn fill(&mut self, recording: &mut Recording, fills: &[Fill]) -> Result<()> {
+    pub fn fill(&mut self, recording: &Recording, fills: &[Fill]) {
         if fills.is_empty() {
-            return Ok(());
+            return;
         }
         let staging = &mut self.staging[recording.slot];
         for (k, fill) in fills.iter().enumerate() {
@@ -84,13 +84,11 @@ impl GpuTileCache {
         let regions: Vec<_> =
             (0u64..).zip(fills).map(|(k, fill)| self.region(k * self.tile_bytes, fill.slot)).collect();
         let (image, staging) = (&self.image, self.staging[recording.slot].raw);
-        recording.scope("textures", |r| {
-            barriers(r.gpu, r.commands, &[image.barrier(READ, WRITTEN)]);
-            // SAFETY: staging and image live until the frame has ended.
-            unsafe { r.gpu.raw.cmd_copy_buffer_to_image(r.commands, staging, image.raw, WRITTEN.2, &regions) };
-            barriers(r.gpu, r.commands, &[image.barrier(WRITTEN, READ)]);
-            Ok(())
-        })
+        let (gpu, commands) = (recording.gpu, recording.commands);
+        barriers(gpu, commands, &[image.barrier(READ, WRITTEN)]);
+        // SAFETY: staging and image live until the frame has ended.
+        unsafe { gpu.raw.cmd_copy_buffer_to_image(commands, staging, image.raw, WRITTEN.2, &regions) };
+        barriers(gpu, commands, &[image.barrier(WRITTEN, READ)]);
     }
 
     fn region(&self, offset: u64, slot: u32) -> vk::BufferImageCopy {
@@ -186,19 +184,24 @@ impl Overlay {
         }
     }
 
-    /// Chooses the parts for a view, fills what was made meanwhile, and writes the frame's table: before the target begins.
-    pub fn look(&mut self, recording: &mut Recording, view: &View) -> Result<()> {
+    /// Chooses the tiles for a view and writes the page table of a slot. Returns the tiles to copy that are ready.
+    pub fn choose(&mut self, slot: usize, view: &View) -> Vec<Fill> {
         let max = self.slots.max_fills();
         let fills = match &mut self.parts {
-            Parts::None => return Ok(()),
+            Parts::None => return Vec::new(),
             Parts::Picture(maps) => maps.look(view, max),
             Parts::Ground(maps) => maps.look(max),
         };
-        self.slots.fill(recording, &fills)?;
         if let Some(table) = self.parts.table() {
-            self.tables[recording.slot].write(0, bytemuck::cast_slice(table));
+            self.tables[slot].write(0, bytemuck::cast_slice(table));
         }
-        Ok(())
+        fills
+    }
+
+    /// Chooses the tiles for a view and records their copies, before rendering begins.
+    pub fn look(&mut self, recording: &Recording, view: &View) {
+        let fills = self.choose(recording.slot, view);
+        self.slots.fill(recording, &fills);
     }
 
     /// Loads all that a view needs of the list seen last. Nothing may be under way on the device.
@@ -207,7 +210,10 @@ impl Overlay {
     /// If something is still missing after `MAX_ROUNDS` rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         for _ in 0..MAX_ROUNDS {
-            once(gpu, |r| self.look(r, view))?;
+            once(gpu, |r| {
+                self.look(r, view);
+                Ok(())
+            })?;
             if self.stats().is_none_or(|stats| stats.pending == 0) {
                 return Ok(());
             }

@@ -1,16 +1,14 @@
-//! The numbers over the picture, the help, and short notes: laid out by egui, drawn by [`crate::gpu::hud`].
+//! The numbers over the picture, the help, and short notes: laid out by egui, drawn by [`crate::gpu::passes::hud`].
 //!
 //! It takes no input. Every character it may show is laid out in every frame, so that the font's texture is
 //! whole from the start and never grows while frames are under way.
 
 use std::sync::Arc;
 
-use egui::epaint::ClippedPrimitive;
-use egui::{
-    Align2, Color32, Context, FontId, Galley, LayerId, Painter, Pos2, RawInput, Rect, TexturesDelta, Vec2, ViewportId,
-};
+use egui::{Align2, Color32, Context, FontId, Galley, LayerId, Painter, Pos2, RawInput, Rect, Vec2, ViewportId};
 
 use super::bindings::Binding;
+use crate::gpu::passes::hud::Painted;
 
 const TEXT: Color32 = Color32::from_rgb(240, 240, 235);
 const FAINT: Color32 = Color32::from_rgb(180, 192, 204);
@@ -30,16 +28,6 @@ pub struct Content<'a> {
     pub help: Option<&'a [Binding]>,
     /// A note.
     pub note: Option<&'a str>,
-}
-
-/// The overlay of one frame.
-pub struct Painted {
-    /// Changed textures.
-    pub textures: TexturesDelta,
-    /// What to draw.
-    pub primitives: Vec<ClippedPrimitive>,
-    /// Pixels a point.
-    pub pixels_per_point: f32,
 }
 
 /// Lays the content out for a window of this size in pixels.

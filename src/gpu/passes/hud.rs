@@ -1,23 +1,41 @@
-//! Draws what egui lays out over a frame.
+//! Pass `hud`: draws the text that egui lays out over a frame of the window.
 
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use ash::vk;
+use egui::TexturesDelta;
 use egui::epaint::{ClippedPrimitive, Mesh, Primitive, Vertex};
 use egui_ash_renderer::allocator::Allocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, RendererError, RendererResult};
 
-use super::device::Gpu;
-use super::frames::{Recording, SLOTS};
-use super::memory::{Buffer, Image, ImageInfo};
-use super::target::Formats;
+use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
+use crate::gpu::device::Gpu;
+use crate::gpu::frames::{Recording, SLOTS};
+use crate::gpu::memory::{Buffer, Image, ImageInfo};
+use crate::gpu::target::Formats;
+use crate::gpu::terrain::Terrain;
 
-/// Vertices that each slot has room for from the start: the help overlay takes about a third.
+pub(super) static ROW: Row =
+    Row { name: "hud", reads: &[], writes: &[Resource::Colour], occurs: Occurs::Last, origin: Origin::Caller };
+
+/// Vertices per slot, allocated with the first frame. The help overlay takes about a third.
 const VERTICES: usize = 32 << 10;
 
-/// egui's renderer and what it needs.
+/// The overlay of one frame, as egui lays it out.
+#[derive(Default)]
+pub struct Painted {
+    /// Changed textures.
+    pub textures: TexturesDelta,
+    /// Shapes to draw.
+    pub primitives: Vec<ClippedPrimitive>,
+    /// Pixels per egui point.
+    pub pixels_per_point: f32,
+}
+
+/// egui's renderer, and the overlay to draw next.
 pub struct Hud {
+    painted: Painted,
     renderer: Renderer<Accounted>,
     pool: vk::CommandPool,
     gpu: Arc<Gpu>,
@@ -25,7 +43,10 @@ pub struct Hud {
 }
 
 impl Hud {
-    /// Draws to attachments of these formats.
+    /// Makes the pass for attachments of these formats.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, formats: Formats) -> Result<Self> {
         let mode = mode(formats);
         let is_srgb = format!("{:?}", formats.colour).contains("SRGB");
@@ -35,17 +56,25 @@ impl Hud {
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);
         // SAFETY: the device is alive; Drop destroys the pool.
         let pool = unsafe { gpu.raw.create_command_pool(&info, None) }?;
-        Ok(Self { renderer, pool, gpu: Arc::clone(gpu), is_reserved: false })
+        Ok(Self { painted: Painted::default(), renderer, pool, gpu: Arc::clone(gpu), is_reserved: false })
     }
 
-    /// Draws from now on to attachments of these formats. It waits for the device.
+    /// Changes the formats of the attachments. Waits for the device.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn reformat(&mut self, formats: Formats) -> Result<()> {
         self.gpu.wait_idle()?;
         self.renderer.set_render_mode(mode(formats)).context("the overlay's pipeline")
     }
 
-    /// Takes over changed textures, between frames. It waits for the device: textures in use change.
-    pub fn update(&mut self, mut textures: egui::TexturesDelta) -> Result<()> {
+    /// Sets the overlay of the next frame. Waits for the device if textures in use change.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn set(&mut self, painted: Painted) -> Result<()> {
+        self.painted = painted;
+        let mut textures = std::mem::take(&mut self.painted.textures);
         if textures.is_empty() {
             return Ok(());
         }
@@ -57,25 +86,27 @@ impl Hud {
         }
         textures.free.drain().try_for_each(|id| self.renderer.free_texture(id)).context("the overlay's font")
     }
+}
 
-    /// Records the overlay: between the target's begin and end, last.
-    pub fn draw(
-        &mut self,
-        recording: &mut Recording,
-        [width, height]: [u32; 2],
-        pixels_per_point: f32,
-        primitives: &mut Vec<ClippedPrimitive>,
-    ) -> Result<()> {
-        if primitives.is_empty() {
-            return Ok(());
-        }
-        if !std::mem::replace(&mut self.is_reserved, true) {
+impl Pass for Hud {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn prepare(&mut self, _: usize, _: &mut Terrain, _: &PassInput) -> bool {
+        let primitives = &mut self.painted.primitives;
+        if !primitives.is_empty() && !std::mem::replace(&mut self.is_reserved, true) {
             primitives.push(room(primitives));
         }
-        let extent = vk::Extent2D { width, height };
-        recording.scope("hud", |r| {
-            self.renderer.cmd_draw(r.commands, extent, pixels_per_point, primitives).context("drawing the overlay")
-        })
+        !primitives.is_empty()
+    }
+
+    fn record(&mut self, recording: &mut Recording, _: &mut Terrain, input: &PassInput) -> Result<()> {
+        let [width, height] = input.view.size;
+        let Painted { primitives, pixels_per_point, .. } = &self.painted;
+        self.renderer
+            .cmd_draw(recording.commands, vk::Extent2D { width, height }, *pixels_per_point, primitives)
+            .context("drawing the overlay")
     }
 }
 
@@ -97,8 +128,8 @@ impl Drop for Hud {
     }
 }
 
-/// An invisible mesh that makes the renderer's buffers, sized by the first frame, as large as they may need
-/// to be: later frames make nothing.
+/// An invisible mesh of [`VERTICES`] vertices. The renderer sizes its buffers by the first frame, so that later frames
+/// allocate nothing.
 fn room(primitives: &[ClippedPrimitive]) -> ClippedPrimitive {
     let texture_id = primitives.iter().find_map(|p| match &p.primitive {
         Primitive::Mesh(mesh) => Some(mesh.texture_id),
@@ -112,11 +143,11 @@ fn room(primitives: &[ClippedPrimitive]) -> ClippedPrimitive {
     ClippedPrimitive { clip_rect: egui::Rect::ZERO, primitive: Primitive::Mesh(mesh) }
 }
 
-/// Gives the renderer buffers and images of our own kind: named, and counted among the device's bytes.
+/// Allocator for the renderer: its buffers and images are named, and counted among the device's bytes.
 struct Accounted(Arc<Gpu>);
 
 /// A buffer or an image.
-enum Resource {
+enum Held {
     Buffer(Buffer),
     Image(#[allow(dead_code, reason = "held for its drop")] Image),
 }
@@ -126,36 +157,36 @@ fn refused(error: anyhow::Error) -> RendererError {
 }
 
 impl Allocator for Accounted {
-    type Allocation = Resource;
+    type Allocation = Held;
 
     fn create_buffer(
         &mut self,
         _: &ash::Device,
         size: usize,
         usage: vk::BufferUsageFlags,
-    ) -> RendererResult<(vk::Buffer, Resource)> {
+    ) -> RendererResult<(vk::Buffer, Held)> {
         let buffer = Buffer::host(&self.0, "hud", size as u64, usage).map_err(refused)?;
-        Ok((buffer.raw, Resource::Buffer(buffer)))
+        Ok((buffer.raw, Held::Buffer(buffer)))
     }
 
-    fn create_image(&mut self, _: &ash::Device, width: u32, height: u32) -> RendererResult<(vk::Image, Resource)> {
+    fn create_image(&mut self, _: &ash::Device, width: u32, height: u32) -> RendererResult<(vk::Image, Held)> {
         let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED;
         let format = vk::Format::R8G8B8A8_SRGB;
         let info = ImageInfo { purpose: "hud", size: [width, height], layers: None, format, usage };
         let image = Image::new(&self.0, info).map_err(refused)?;
-        Ok((image.raw, Resource::Image(image)))
+        Ok((image.raw, Held::Image(image)))
     }
 
-    fn destroy_buffer(&mut self, _: &ash::Device, _: vk::Buffer, _: Resource) -> RendererResult<()> {
+    fn destroy_buffer(&mut self, _: &ash::Device, _: vk::Buffer, _: Held) -> RendererResult<()> {
         Ok(())
     }
 
-    fn destroy_image(&mut self, _: &ash::Device, _: vk::Image, _: Resource) -> RendererResult<()> {
+    fn destroy_image(&mut self, _: &ash::Device, _: vk::Image, _: Held) -> RendererResult<()> {
         Ok(())
     }
 
-    fn update_buffer<T: Copy>(&mut self, _: &ash::Device, memory: &mut Resource, data: &[T]) -> RendererResult<()> {
-        if let Resource::Buffer(buffer) = memory {
+    fn update_buffer<T: Copy>(&mut self, _: &ash::Device, memory: &mut Held, data: &[T]) -> RendererResult<()> {
+        if let Held::Buffer(buffer) = memory {
             // SAFETY: vertices, indices and texels are plain data without padding.
             let bytes = unsafe { std::slice::from_raw_parts(data.as_ptr().cast(), size_of_val(data)) };
             buffer.write(0, bytes);
