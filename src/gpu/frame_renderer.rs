@@ -40,7 +40,7 @@ pub struct FrameRenderer {
     gpu: Arc<Gpu>,
 }
 
-/// What a frame shows.
+/// One frame to draw.
 pub struct FrameInput<'a> {
     /// The view.
     pub view: &'a View,

@@ -1,10 +1,8 @@
-//! An array of texture slots of one size that frames fill while they are drawn, with the maps of a picture in it or the
-//! texels of the ground.
+//! Tile cache of a virtual texture: slots of one size in one array image, filled by frames while they are drawn.
 //!
-//! A slot is a layer of one array image, bound by a plain descriptor. A frame copies at most so many bytes into slots, from
-//! staging of its own, before it draws; the barrier before the copies waits for the frames that still read. Whoever
-//! chooses the slots ([`VirtualOverlay`], [`VirtualGround`]) gives none away that served in the frame before, so that with two frames in flight
-//! nothing that is read is overwritten.
+//! A frame copies at most `FRAME_BYTES` into slots before it draws, from staging memory of its own. The barrier before
+//! the copies waits for the frames that still read. [`VirtualOverlay`] and [`VirtualGround`] choose the slots. They reuse no
+//! slot of the frame before, so that with two frames in flight no tile is overwritten while it is read.
 
 use std::sync::Arc;
 
@@ -25,14 +23,14 @@ use crate::texture::virtual_overlay::VirtualOverlay;
 pub use crate::texture::virtual_overlay::VirtualTextureStats;
 use crate::view::View;
 
-/// The most bytes that a frame copies into slots.
+/// Most bytes that a frame copies into slots.
 const FRAME_BYTES: u64 = 4 << 20;
-/// More rounds than any view takes to load: each brings one tile at least, and no table of slots has as many.
+/// Limit of loading rounds. Each round brings at least one tile, and no cache has as many slots.
 const MAX_ROUNDS: u32 = 100_000;
 
 /// The slots.
 pub struct GpuTileCache {
-    /// A layer a slot.
+    /// The array image: one layer per slot.
     pub image: Image,
     /// Linear within a slot.
     pub sampler: Sampler,
@@ -41,7 +39,10 @@ pub struct GpuTileCache {
 }
 
 impl GpuTileCache {
-    /// So many slots of `side` × `side` texels, in no defined state.
+    /// Makes `count` slots of `side` × `side` texels with undefined content.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, purpose: &'static str, side: u32, count: u32) -> Result<Self> {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let format = vk::Format::R8G8B8A8_SRGB;
@@ -63,7 +64,7 @@ impl GpuTileCache {
         Ok(slots)
     }
 
-    /// The most slots that a frame fills.
+    /// Most slots that a frame fills.
     pub fn max_fills(&self) -> usize {
         (self.staging[0].size / self.tile_bytes) as usize
     }
@@ -102,26 +103,26 @@ impl GpuTileCache {
     }
 }
 
-/// As fragments read the image.
+/// Use of the image by fragment shaders.
 const READ: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
     vk::PipelineStageFlags2::FRAGMENT_SHADER,
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
-/// As copies write it.
+/// Use of the image by copies.
 const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
 
-/// The texels laid over a scene in parts: those of a picture, or of the ground; without either stand-ins.
+/// The virtual texture of a scene: a draped picture, or the ground. A scene without one has placeholders of one texel.
 pub struct Overlay {
     /// The slots.
     pub slots: GpuTileCache,
-    /// In which a fragment finds its part, one table a frame in flight.
+    /// Page tables, one per frame in flight.
     pub tables: Vec<Buffer>,
     parts: Parts,
 }
 
-/// Whose texels they are.
+/// The source of the texels.
 enum Parts {
     None,
     Picture(Box<VirtualOverlay>),
@@ -129,7 +130,10 @@ enum Parts {
 }
 
 impl Overlay {
-    /// What the plan says of the picture and the ground.
+    /// Makes the virtual texture that the plan needs.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
@@ -161,14 +165,14 @@ impl Overlay {
         };
         let table = |_| Buffer::host(gpu, "texture table", 4 * words as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
         let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, parts };
-        // Everything by the root.
+        // At first the root serves every page.
         if let Some(table) = overlay.parts.table() {
             overlay.tables.iter_mut().for_each(|buffer| buffer.write(0, bytemuck::cast_slice(table)));
         }
         Ok(overlay)
     }
 
-    /// Whether it is what a plan says.
+    /// Returns true if the virtual texture is the one that a plan needs.
     pub fn serves(&self, plan: &ScenePlan) -> bool {
         match &self.parts {
             Parts::None => plan.ground.is_none() && plan.maps.is_none(),
@@ -177,7 +181,7 @@ impl Overlay {
         }
     }
 
-    /// Is told of a list that is to be drawn: its triangles say which texels of the ground are needed.
+    /// Takes a list that will be drawn: its triangles determine the texels of the ground that are needed.
     pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
         if let Parts::Ground(maps) = &mut self.parts {
             maps.see(view, resident, list);
@@ -204,10 +208,10 @@ impl Overlay {
         self.slots.fill(recording, &fills);
     }
 
-    /// Loads all that a view needs of the list seen last. Nothing may be under way on the device.
+    /// Loads all tiles that a view needs. The device must be idle.
     ///
     /// # Errors
-    /// If something is still missing after `MAX_ROUNDS` rounds.
+    /// If tiles are still missing after `MAX_ROUNDS` rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         for _ in 0..MAX_ROUNDS {
             once(gpu, |r| {
@@ -226,7 +230,7 @@ impl Overlay {
         bail!("textures of the view are still missing after {MAX_ROUNDS} rounds")
     }
 
-    /// What is held, if something is there in parts.
+    /// Returns the statistics of the virtual texture, if there is one.
     pub fn stats(&self) -> Option<VirtualTextureStats> {
         match &self.parts {
             Parts::None => None,

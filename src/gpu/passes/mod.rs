@@ -149,7 +149,7 @@ pub struct PassInput<'a> {
     pub probe: Option<(&'a Probe, &'a [Piece])>,
 }
 
-/// What passes are made from.
+/// The scene that a pass is made for.
 pub struct MakeInput<'a> {
     /// The device.
     pub gpu: &'a Arc<Gpu>,
