@@ -1,5 +1,6 @@
 //! The arrows: which module may use which, where the device may be named, and how long a file may be.
 
+mod frames;
 mod paths;
 mod words;
 
