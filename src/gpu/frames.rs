@@ -7,14 +7,14 @@ use ash::vk;
 
 use super::device::Gpu;
 
-/// Frames whose commands may be under way at once. Two: the host records one while the device draws another.
+/// Frames in flight: the host records one while the device draws the other.
 pub const SLOTS: usize = 2;
-/// Passes that a frame may time.
+/// Most passes that a frame times.
 const SCOPES: u32 = 16;
 /// Queries of a stamp: see [`stamp`].
 pub(super) const STAMP: u32 = 2;
 
-/// What the device did in a frame.
+/// Device times and counts of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timing {
     /// Name and milliseconds of each pass, in order.
@@ -25,17 +25,17 @@ pub struct Timing {
     pub total_ms: f64,
     /// Vertices run, primitives after clipping, fragments run — of the pass named `terrain`.
     pub statistics: Option<[u64; 3]>,
-    /// Fragments of the pass named `terrain` that passed the depth test, where [`Frames::counts_passed`].
+    /// Fragments of the pass named `terrain` that passed the depth test, if the frame counted them.
     pub passed: Option<u64>,
 }
 
-/// The slots.
-pub struct Frames {
+/// The frames in flight, used in turn.
+pub(super) struct Frames {
     gpu: Arc<Gpu>,
     slots: Vec<Slot>,
     next: usize,
     measured: bool,
-    /// Whether fragments that pass the depth test are counted from the next frame on, if the device can: it costs time.
+    /// True if later frames count fragments that pass the depth test, where the device can. Counting costs time.
     pub counts_passed: bool,
     /// The newest timing read back.
     pub timing: Timing,
@@ -43,9 +43,9 @@ pub struct Frames {
 
 struct Slot {
     pool: vk::CommandPool,
-    /// One for each submission of a frame.
+    /// One command buffer per submission of a frame.
     commands: Vec<vk::CommandBuffer>,
-    /// Which of them is being recorded.
+    /// Index of the one being recorded.
     current: usize,
     fence: vk::Fence,
     stamps: vk::QueryPool,
@@ -56,7 +56,7 @@ struct Slot {
     has_statistics: bool,
 }
 
-/// A frame being recorded.
+/// A command buffer being recorded.
 pub struct Recording<'a> {
     /// The device.
     pub gpu: &'a Arc<Gpu>,
@@ -64,8 +64,8 @@ pub struct Recording<'a> {
     pub commands: vk::CommandBuffer,
     /// The slot's number, below [`SLOTS`].
     pub slot: usize,
-    state: &'a mut Slot,
-    measured: bool,
+    /// Queries of the frame; none in a command buffer that another renderer began.
+    queries: Option<&'a mut Slot>,
 }
 
 impl Frames {
@@ -77,8 +77,13 @@ impl Frames {
         Ok(Self { gpu: Arc::clone(gpu), slots, next: 0, measured, counts_passed: false, timing })
     }
 
-    /// Waits for the next slot, reads its timing, and starts recording.
+    /// Waits for the next slot, reads its timing, and starts recording a frame.
     pub fn begin(&mut self) -> Result<Recording<'_>> {
+        self.start()?;
+        Ok(self.resume())
+    }
+
+    fn start(&mut self) -> Result<()> {
         let slot = self.next;
         self.wait(slot)?;
         let state = &mut self.slots[slot];
@@ -99,18 +104,17 @@ impl Frames {
                 }
             }
         }
-        begin(&self.gpu, state.commands[0])?;
-        Ok(self.resume())
+        begin(&self.gpu, state.commands[0])
     }
 
-    /// Goes on recording the frame that was begun.
+    /// Returns the frame that was begun, to record more of it.
     pub fn resume(&mut self) -> Recording<'_> {
         let state = &mut self.slots[self.next];
         let commands = state.commands[state.current];
-        Recording { gpu: &self.gpu, commands, slot: self.next, state, measured: self.measured }
+        Recording { gpu: &self.gpu, commands, slot: self.next, queries: self.measured.then_some(state) }
     }
 
-    /// Submits what is recorded of a frame so far; the rest is recorded into another command buffer.
+    /// Submits the part of a frame recorded so far; the rest goes into another command buffer.
     pub fn submit_part(&mut self) -> Result<()> {
         let gpu = &self.gpu;
         let slot = &mut self.slots[self.next];
@@ -122,8 +126,8 @@ impl Frames {
         begin(gpu, slot.commands[slot.current])
     }
 
-    /// Ends recording and submits, waiting for and signalling the given semaphores.
-    pub fn submit(&mut self, wait: Option<vk::Semaphore>, signal: Option<vk::Semaphore>) -> Result<()> {
+    /// Ends recording and submits, waiting for and signalling the target's semaphores.
+    pub fn submit(&mut self, Semaphores { wait, signal }: Semaphores) -> Result<()> {
         let slot = &self.slots[self.next];
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let semaphore = |s: vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(s).stage_mask(stage);
@@ -158,53 +162,49 @@ impl Frames {
     }
 }
 
-impl Recording<'_> {
+/// Semaphores of a submission.
+#[derive(Clone, Copy, Default)]
+pub struct Semaphores {
+    /// The frame waits for this one before it draws.
+    pub wait: Option<vk::Semaphore>,
+    /// The frame signals this one when it is drawn.
+    pub signal: Option<vk::Semaphore>,
+}
+
+impl<'a> Recording<'a> {
+    /// Wraps a command buffer that another renderer began. Passes in it are labelled but not timed. `slot` is below
+    /// [`SLOTS`], and the commands recorded before under the same slot have finished.
+    pub fn of_caller(gpu: &'a Arc<Gpu>, commands: vk::CommandBuffer, slot: usize) -> Self {
+        Self { gpu, commands, slot, queries: None }
+    }
+
     /// Records a pass under one name: debug label and timestamps.
     pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         self.counted_scope(name, false, record)
     }
 
-    /// The same, with pipeline statistics if it `counts`: one pass of a frame at most.
+    /// Records a pass like [`Self::scope`], with pipeline statistics if `counts`: at most one pass of a frame.
     pub fn counted_scope<T>(
         &mut self,
         name: &'static str,
         counts: bool,
         record: impl FnOnce(&mut Self) -> Result<T>,
     ) -> Result<T> {
-        let commands = self.commands;
-        self.gpu.begin_label(commands, name);
-        let timed = self.measured && (self.state.scopes.len() as u32) < SCOPES;
-        let first = 2 * self.state.scopes.len() as u32;
-        let counted = timed && counts && self.state.statistics != vk::QueryPool::null();
-        // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
-        unsafe {
-            if timed {
-                self.state.scopes.push(name);
-                stamp(self.gpu, commands, vk::PipelineStageFlags2::TOP_OF_PIPE, self.state.stamps, first);
-            }
-            if counted {
-                self.state.has_statistics = true;
-                let flags = vk::QueryControlFlags::empty();
-                self.gpu.raw.cmd_begin_query(commands, self.state.statistics, 0, flags);
-            }
-            if counted && self.state.counts_passed {
-                self.gpu.raw.cmd_begin_query(commands, self.state.passed, 0, vk::QueryControlFlags::PRECISE);
-            }
+        let (gpu, commands) = (self.gpu, self.commands);
+        gpu.begin_label(commands, name);
+        let first = self.queries.as_mut().and_then(|queries| queries.begin_scope(gpu, commands, name));
+        let counted = first.is_some() && counts;
+        if let (true, Some(queries)) = (counted, &mut self.queries) {
+            queries.begin_counts(gpu, commands);
         }
         let result = record(self);
-        // SAFETY: the queries begun above are ended in the same command buffer.
-        unsafe {
-            if counted && self.state.counts_passed {
-                self.gpu.raw.cmd_end_query(commands, self.state.passed, 0);
-            }
+        if let (Some(first), Some(queries)) = (first, &mut self.queries) {
             if counted {
-                self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
+                queries.end_counts(gpu, commands);
             }
-            if timed {
-                stamp(self.gpu, commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, self.state.stamps, first + 1);
-            }
+            stamp(gpu, commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, queries.stamps, first + 1);
         }
-        self.gpu.end_label(commands);
+        gpu.end_label(commands);
         result
     }
 }
@@ -256,6 +256,44 @@ impl Slot {
                 scopes,
                 has_statistics,
             })
+        }
+    }
+
+    /// Stamps the start of a pass and returns the stamp's number, or nothing if all stamps are taken.
+    fn begin_scope(&mut self, gpu: &Gpu, commands: vk::CommandBuffer, name: &'static str) -> Option<u32> {
+        if self.scopes.len() as u32 >= SCOPES {
+            return None;
+        }
+        let first = 2 * self.scopes.len() as u32;
+        self.scopes.push(name);
+        stamp(gpu, commands, vk::PipelineStageFlags2::TOP_OF_PIPE, self.stamps, first);
+        Some(first)
+    }
+
+    fn begin_counts(&mut self, gpu: &Gpu, commands: vk::CommandBuffer) {
+        if self.statistics == vk::QueryPool::null() {
+            return;
+        }
+        self.has_statistics = true;
+        // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
+        unsafe {
+            gpu.raw.cmd_begin_query(commands, self.statistics, 0, vk::QueryControlFlags::empty());
+            if self.counts_passed {
+                gpu.raw.cmd_begin_query(commands, self.passed, 0, vk::QueryControlFlags::PRECISE);
+            }
+        }
+    }
+
+    fn end_counts(&mut self, gpu: &Gpu, commands: vk::CommandBuffer) {
+        if self.statistics == vk::QueryPool::null() {
+            return;
+        }
+        // SAFETY: `begin_counts` began the queries in the same command buffer.
+        unsafe {
+            if self.counts_passed {
+                gpu.raw.cmd_end_query(commands, self.passed, 0);
+            }
+            gpu.raw.cmd_end_query(commands, self.statistics, 0);
         }
     }
 
@@ -322,8 +360,8 @@ fn submit(gpu: &Gpu, commands: vk::CommandBuffer, info: vk::SubmitInfo2, fence: 
     }
 }
 
-/// Stamps the time with stamp number `k` of a pool. llvmpipe takes a stamp while it rasterises what follows it, up to
-/// the next one: a second one, which nobody reads, parts it from that.
+/// Writes stamp number `k` of a pool. llvmpipe takes a stamp while it rasterises the commands between it and the next
+/// stamp. A second stamp, which is never read, separates the first from those commands.
 pub(super) fn stamp(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
@@ -346,10 +384,11 @@ pub(super) fn read_stamps(gpu: &Gpu, pool: vk::QueryPool, count: usize) -> Resul
     Ok(ticks.into_iter().step_by(STAMP as usize).collect())
 }
 
-/// Records commands, submits them and waits: for work before the first frame.
+/// Records commands outside any frame, submits them and waits.
 pub fn once(gpu: &Arc<Gpu>, record: impl FnOnce(&mut Recording) -> Result<()>) -> Result<()> {
     let mut frames = Frames::new(gpu, false)?;
-    record(&mut frames.begin()?)?;
-    frames.submit(None, None)?;
+    frames.start()?;
+    record(&mut frames.resume())?;
+    frames.submit(Semaphores::default())?;
     frames.finish()
 }

@@ -1,5 +1,4 @@
-//! Selection on the device: runs the programs of a [`GpuSelection`], whose technique it does not know, and reads back what
-//! they found.
+//! Selection on the device: runs the compute shaders of a [`GpuSelection`] and reads back the draws that they found.
 
 use std::sync::Arc;
 
@@ -22,7 +21,7 @@ use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
 
 const HEAD: usize = size_of::<Tally>();
 
-/// Pipelines, the table, and what each frame in flight writes.
+/// Pipelines, the table of the technique, and the buffers of each frame in flight.
 pub struct GpuSelector {
     gpu: Arc<Gpu>,
     pool: vk::CommandPool,
@@ -37,7 +36,7 @@ pub struct GpuSelector {
 }
 
 struct Slot {
-    /// The whole selection, recorded once: a frame adds no more than its parameters.
+    /// The whole selection, recorded once. A frame only writes its parameters.
     selection: vk::CommandBuffer,
     bindings: Bindings,
     parameters: Buffer,
@@ -49,7 +48,10 @@ struct Slot {
 }
 
 impl GpuSelector {
-    /// Makes what a driver needs. The device must count draws ([`Gpu::counts_draws`]).
+    /// Makes pipelines and buffers. The device must support [`Gpu::counts_draws`].
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, gpu_selection: &GpuSelection) -> Result<Self> {
         use vk::BufferUsageFlags as Usage;
         let table = filled(gpu, "selection table", bytemuck::cast_slice(&gpu_selection.table), Usage::STORAGE_BUFFER)?;
@@ -81,18 +83,14 @@ impl GpuSelector {
         Ok(gpu_selector)
     }
 
-    /// Records the selection for a view told by its parameters: before the target begins.
-    pub fn select(&mut self, recording: &mut Recording, parameters: &[u32]) -> Result<()> {
+    /// Records the selection for a view, given by its parameters, before rendering begins.
+    pub(super) fn select(&mut self, recording: &Recording, parameters: &[u32]) {
         self.newest = recording.slot;
         let slot = &mut self.slots[self.newest];
         slot.parameters.write(0, bytemuck::cast_slice(parameters));
         slot.has_run = true;
-        let selection = [slot.selection];
-        recording.scope("select", |r| {
-            // SAFETY: the slot's last frame has ended, so its selection is not under way.
-            unsafe { r.gpu.raw.cmd_execute_commands(r.commands, &selection) };
-            Ok(())
-        })
+        // SAFETY: the slot's last frame has ended, so its selection is not under way.
+        unsafe { recording.gpu.raw.cmd_execute_commands(recording.commands, &[slot.selection]) };
     }
 
     fn record(&self, slot: &Slot) -> Result<()> {
@@ -157,12 +155,12 @@ impl GpuSelector {
         }
     }
 
-    /// The instances of a frame.
+    /// Instances of a frame.
     pub(super) fn instances(&self, r: &Recording) -> vk::Buffer {
         self.slots[r.slot].instances.raw
     }
 
-    /// Records the draws that were found.
+    /// Records all draws that the device finds.
     pub(super) fn draw(&self, r: &Recording) {
         let commands = self.slots[r.slot].commands.raw;
         // SAFETY: the buffer holds a count and at most that many commands.
@@ -172,7 +170,7 @@ impl GpuSelector {
         }
     }
 
-    /// Records some of the draws that were found: one that is not there would be an old one.
+    /// Records some of the draws that the device finds. The caller knows from an earlier frame that they exist.
     pub(super) fn draw_some(&self, r: &Recording, draws: std::ops::Range<usize>) {
         let (first, commands) = ((HEAD + draws.start * COMMAND) as u64, self.slots[r.slot].commands.raw);
         let count = draws.len() as u32;
@@ -180,8 +178,8 @@ impl GpuSelector {
         unsafe { self.gpu.raw.cmd_draw_indexed_indirect(r.commands, commands, first, count, COMMAND as u32) };
     }
 
-    /// Fills a list with the draws that the newest frame of a slot found, once it has finished, and no instances.
-    /// Before the first frame it is left as it is.
+    /// Fills a list with the draws that the newest frame of a slot found, once it has finished, without instances.
+    /// Leaves the list unchanged before the slot's first frame.
     pub fn read_draws(&self, slot: usize, list: &mut DrawList) {
         if !self.slots[slot].has_run {
             return;
@@ -201,7 +199,10 @@ impl GpuSelector {
         self.newest
     }
 
-    /// The first instances of the newest frame, once it has finished.
+    /// Returns the first instances of the newest frame, once it has finished.
+    ///
+    /// # Errors
+    /// If the device fails, or the frame has fewer instances.
     pub fn read_instances(&self, count: usize) -> Result<Vec<Instance>> {
         let bytes = count * size_of::<Instance>();
         let instances = &self.slots[self.newest].instances;
@@ -226,7 +227,7 @@ impl GpuSelector {
     }
 }
 
-/// A command as the draw that it is.
+/// Returns the draw of an indirect command.
 fn draw(command: &[u8]) -> Draw {
     let [indices, instances, first_index, first_vertex, first_instance]: [u32; 5] =
         bytemuck::pod_read_unaligned(command);

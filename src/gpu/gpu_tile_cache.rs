@@ -1,10 +1,8 @@
-//! The GPU side of virtual textures: a tile cache in an image array, filled while frames are drawn, and the page
-//! tables.
+//! Tile cache of a virtual texture: slots of one size in one array image, filled by frames while they are drawn.
 //!
-//! A cache slot is a layer of one array image, bound by a plain descriptor. Before a frame draws, it copies a limited
-//! number of bytes from its own staging buffer into slots. The barrier before the copies waits for frames that still
-//! read. [`VirtualOverlay`] and [`VirtualGround`] choose the slots; they never reassign a slot used in the previous
-//! frame. With two frames in flight, nothing that is read is overwritten.
+//! A frame copies at most `FRAME_BYTES` into slots before it draws, from staging memory of its own. The barrier before
+//! the copies waits for the frames that still read. [`VirtualOverlay`] and [`VirtualGround`] choose the slots. They reuse no
+//! slot of the frame before, so that with two frames in flight no tile is overwritten while it is read.
 
 use std::sync::Arc;
 
@@ -25,15 +23,14 @@ use crate::texture::virtual_overlay::VirtualOverlay;
 pub use crate::texture::virtual_overlay::VirtualTextureStats;
 use crate::view::View;
 
-/// Upper limit of bytes that a frame copies into slots (at least one tile).
+/// Most bytes that a frame copies into slots.
 const FRAME_BYTES: u64 = 4 << 20;
-/// Upper limit of rounds in which a view's tiles load. Each round loads at least one tile, and no cache has as many
-/// slots.
+/// Limit of loading rounds. Each round brings at least one tile, and no cache has as many slots.
 const MAX_ROUNDS: u32 = 100_000;
 
 /// The cache slots and the staging buffers that fill them.
 pub struct GpuTileCache {
-    /// Array image with one layer per slot, sRGB.
+    /// The array image: one layer per slot.
     pub image: Image,
     /// Linear filtering, clamped to the edges of a slot.
     pub sampler: Sampler,
@@ -42,7 +39,10 @@ pub struct GpuTileCache {
 }
 
 impl GpuTileCache {
-    /// Creates `count` slots of `side` × `side` texels with undefined contents.
+    /// Makes `count` slots of `side` × `side` texels with undefined content.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, purpose: &'static str, side: u32, count: u32) -> Result<Self> {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let format = vk::Format::R8G8B8A8_SRGB;
@@ -73,9 +73,9 @@ impl GpuTileCache {
     ///
     /// # Panics
     /// If there are more than [`Self::max_uploads`] tiles, or if a tile has another size.
-    pub fn upload(&mut self, recording: &mut Recording, uploads: &[TileUpload]) -> Result<()> {
+    pub fn upload(&mut self, recording: &Recording, uploads: &[TileUpload]) {
         if uploads.is_empty() {
-            return Ok(());
+            return;
         }
         let staging = &mut self.staging[recording.slot];
         for (k, upload) in uploads.iter().enumerate() {
@@ -85,13 +85,11 @@ impl GpuTileCache {
         let regions: Vec<_> =
             (0u64..).zip(uploads).map(|(k, upload)| self.region(k * self.tile_bytes, upload.slot)).collect();
         let (image, staging) = (&self.image, self.staging[recording.slot].raw);
-        recording.scope("textures", |r| {
-            barriers(r.gpu, r.commands, &[image.barrier(READ, WRITTEN)]);
-            // SAFETY: staging and image live until the frame has ended.
-            unsafe { r.gpu.raw.cmd_copy_buffer_to_image(r.commands, staging, image.raw, WRITTEN.2, &regions) };
-            barriers(r.gpu, r.commands, &[image.barrier(WRITTEN, READ)]);
-            Ok(())
-        })
+        let (gpu, commands) = (recording.gpu, recording.commands);
+        barriers(gpu, commands, &[image.barrier(READ, WRITTEN)]);
+        // SAFETY: staging and image live until the frame has ended.
+        unsafe { gpu.raw.cmd_copy_buffer_to_image(commands, staging, image.raw, WRITTEN.2, &regions) };
+        barriers(gpu, commands, &[image.barrier(WRITTEN, READ)]);
     }
 
     fn region(&self, offset: u64, slot: u32) -> vk::BufferImageCopy {
@@ -105,17 +103,17 @@ impl GpuTileCache {
     }
 }
 
-/// Image state for sampling in fragment shaders.
+/// Use of the image by fragment shaders.
 const READ: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
     vk::PipelineStageFlags2::FRAGMENT_SHADER,
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
-/// Image state for copies.
+/// Use of the image by copies.
 const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
 
-/// The virtual texture of a scene: an overlay image, generated ground, or a one-texel placeholder.
+/// The virtual texture of a scene: a draped picture, or the ground. A scene without one has placeholders of one texel.
 pub struct Overlay {
     /// The tile cache.
     pub slots: GpuTileCache,
@@ -132,7 +130,10 @@ enum VirtualTexture {
 }
 
 impl Overlay {
-    /// Creates the virtual texture that a scene plan lists.
+    /// Makes the virtual texture that the plan needs.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
@@ -171,7 +172,7 @@ impl Overlay {
         Ok(overlay)
     }
 
-    /// Returns true if this is the virtual texture of a plan, so that it can be kept.
+    /// Returns true if the virtual texture is the one that a plan needs.
     pub fn serves(&self, plan: &ScenePlan) -> bool {
         match &self.texture {
             VirtualTexture::None => plan.ground.is_none() && plan.maps.is_none(),
@@ -180,36 +181,43 @@ impl Overlay {
         }
     }
 
-    /// Passes the draw list of the next frame on: its triangles determine the ground tiles needed.
+    /// Takes a list that will be drawn: its triangles determine the texels of the ground that are needed.
     pub fn see(&mut self, view: &View, resident: &Geometry, list: &DrawList) {
         if let VirtualTexture::Ground(texture) = &mut self.texture {
             texture.require(view, resident, list);
         }
     }
 
-    /// Chooses tiles for a view, records uploads of generated ones and writes the frame's page table. Must precede
-    /// the beginning of rendering.
-    pub fn look(&mut self, recording: &mut Recording, view: &View) -> Result<()> {
+    /// Chooses the tiles for a view and writes the page table of a slot. Returns the tiles that are ready for upload.
+    pub fn choose(&mut self, slot: usize, view: &View) -> Vec<TileUpload> {
         let max = self.slots.max_uploads();
         let uploads = match &mut self.texture {
-            VirtualTexture::None => return Ok(()),
+            VirtualTexture::None => return Vec::new(),
             VirtualTexture::Picture(texture) => texture.update(view, max),
             VirtualTexture::Ground(texture) => texture.update(max),
         };
-        self.slots.upload(recording, &uploads)?;
         if let Some(table) = self.texture.table() {
-            self.tables[recording.slot].write(0, bytemuck::cast_slice(table));
+            self.tables[slot].write(0, bytemuck::cast_slice(table));
         }
-        Ok(())
+        uploads
     }
 
-    /// Loads all tiles that a view and the last draw list need. The GPU must be idle.
+    /// Chooses the tiles for a view and records their uploads. Must precede the beginning of rendering.
+    pub fn look(&mut self, recording: &Recording, view: &View) {
+        let uploads = self.choose(recording.slot, view);
+        self.slots.upload(recording, &uploads);
+    }
+
+    /// Loads all tiles that a view needs. The device must be idle.
     ///
     /// # Errors
     /// If tiles are still missing after `MAX_ROUNDS` rounds.
     pub fn settle(&mut self, gpu: &Arc<Gpu>, view: &View) -> Result<()> {
         for _ in 0..MAX_ROUNDS {
-            once(gpu, |r| self.look(r, view))?;
+            once(gpu, |r| {
+                self.look(r, view);
+                Ok(())
+            })?;
             if self.stats().is_none_or(|stats| stats.pending == 0) {
                 return Ok(());
             }
@@ -222,7 +230,7 @@ impl Overlay {
         bail!("virtual-texture tiles of the view are still missing after {MAX_ROUNDS} rounds")
     }
 
-    /// Returns the cache statistics; `None` without a virtual texture.
+    /// Returns the statistics of the virtual texture, if there is one.
     pub fn stats(&self) -> Option<VirtualTextureStats> {
         match &self.texture {
             VirtualTexture::None => None,

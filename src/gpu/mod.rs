@@ -1,25 +1,24 @@
-//! Executes draw lists on Vulkan. The only module that uses `ash` or `unsafe`.
+//! Executes draw lists on Vulkan: the only module that uses `ash` and `unsafe`.
 //!
-//! The module does not depend on the technique that produced a list. Offscreen images and windows are two targets
-//! with the same two steps. All resources are created at start or on a change of scene; none inside a frame.
+//! It does not depend on any technique. One [`frame_renderer`] draws every frame as a list of [`passes`] to a
+//! [`target`]. All objects are made in advance; nothing is created inside a frame.
 #![allow(unsafe_code)]
 
 mod bindings;
-pub mod capture;
 pub mod clock;
 pub mod device;
-pub mod error_pass;
+pub mod frame_renderer;
 pub mod frames;
 pub mod gpu_selection;
 pub mod gpu_tile_cache;
 pub mod height_pages;
-#[cfg(feature = "viewer")]
-pub mod hud;
 pub mod instance;
 mod live;
 mod loss;
 mod materials;
 pub mod memory;
+mod pass_list;
+pub mod passes;
 pub mod pipelines;
 pub mod position_check;
 pub mod probe;
@@ -27,12 +26,13 @@ pub mod renderdoc;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;
-pub mod shading_only;
 pub mod slot;
 #[cfg(feature = "viewer")]
 pub mod swapchain;
 pub mod target;
 pub mod terrain;
+#[cfg(feature = "viewer")]
+pub mod window_target;
 
 pub use device::{Choice, Gpu};
 pub use instance::Instance;

@@ -1,9 +1,7 @@
-//! Queries of every draw: the frame's draws recorded one by one, each between two timestamps and with statistics
-//! of its own.
+//! Queries of every draw: the draws of a frame are recorded one by one, each with two timestamps and its own statistics.
 //!
-//! A draw's time goes from when everything before it had finished until it has finished itself, so that the times
-//! of the draws add up to that of their pass; where a device would have them overlap, the later one shows only what
-//! it added.
+//! A draw's time starts when all work before it has finished and ends when the draw has finished. The times of the draws
+//! therefore add up to that of their pass. Where two draws overlap on the device, the later one counts only its own end.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,50 +14,50 @@ use super::frames::{Recording, STAMP, read_stamps, stamp};
 use super::terrain::Terrain;
 use crate::draw::{Draw, DrawList, Source, Topology};
 
-/// Draws with queries of their own; those beyond share one, pipeline by pipeline.
+/// Most draws with their own queries; the others share one query per pipeline.
 pub const DRAWS: usize = 4096;
-/// Pipelines that a list may go through: its sources and topologies side by side.
+/// Most pipelines of a list: three sources times two topologies.
 const PIPELINES: usize = 6;
 
-/// Query pools for one frame at a time.
+/// Query pools of one frame.
 pub struct Probe {
     gpu: Arc<Gpu>,
     stamps: vk::QueryPool,
     statistics: Option<vk::QueryPool>,
 }
 
-/// Draws that are measured together: one, or the rest.
+/// Draws measured together: a single draw, or all that remain of a pipeline.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// Which of the list's draws.
+    /// Range of the list's draws.
     pub draws: Range<usize>,
     /// Its name in every tool.
     pub label: String,
 }
 
-/// What a piece made of the device's programs.
+/// Shader invocations and primitives of a piece.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Vertex programs run.
+    /// Vertex shader invocations.
     pub vertices: u64,
     /// Primitives that reached clipping.
     pub clipped: u64,
-    /// Primitives that clipping let through or made.
+    /// Primitives after clipping.
     pub primitives: u64,
-    /// Fragment programs run.
+    /// Fragment shader invocations.
     pub fragments: u64,
 }
 
-/// What a piece took.
+/// Times and counts of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Measured {
     /// Device ticks at its start and its end.
     pub ticks: [u64; 2],
-    /// Its counts, where the device has statistics.
+    /// Counts, if the device has pipeline statistics.
     pub counts: Option<Counts>,
 }
 
-/// A list's draws cut for measuring: one by one up to `max`, the rest of each pipeline together.
+/// Cuts a list's draws for measuring: one by one up to `max`, the rest of each pipeline together.
 pub fn pieces(draws: &[Draw], max: usize) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut first = 0;
@@ -75,7 +73,7 @@ pub fn pieces(draws: &[Draw], max: usize) -> Vec<Range<usize>> {
     pieces
 }
 
-/// The name of a pipeline.
+/// Returns the name of a pipeline.
 pub fn pipeline_name(source: Source, topology: Topology) -> &'static str {
     match (source, topology) {
         (Source::Lattice, Topology::Triangles) => "lattice triangles",
@@ -88,7 +86,10 @@ pub fn pipeline_name(source: Source, topology: Topology) -> &'static str {
 }
 
 impl Probe {
-    /// Pools for [`DRAWS`] draws.
+    /// Makes pools for [`DRAWS`] draws.
+    ///
+    /// # Errors
+    /// If the queue has no timestamps.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self> {
         if gpu.timestamp_ns == 0.0 {
             bail!("{}: its queue has no timestamps: nothing can be profiled", gpu.candidate.name);
@@ -113,7 +114,7 @@ impl Probe {
         Ok(probe)
     }
 
-    /// Makes the queries ready and stamps the start of the first piece. No frame uses them any more.
+    /// Resets the queries and stamps the start of the first piece. No frame in flight uses them.
     fn begin(&self, r: &Recording, pieces: usize) {
         // SAFETY: the frame that used the queries last has finished.
         unsafe {
@@ -125,7 +126,7 @@ impl Probe {
         self.stamp(r, 0);
     }
 
-    /// Stamps the end of everything before.
+    /// Stamps the end of all earlier work.
     fn stamp(&self, r: &Recording, k: usize) {
         stamp(&self.gpu, r.commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, self.stamps, k as u32);
     }
@@ -147,7 +148,10 @@ impl Probe {
         self.gpu.end_label(r.commands);
     }
 
-    /// What each piece of the last frame took, once that has finished.
+    /// Returns times and counts of the pieces of the last frame, once that has finished.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn read(&self, pieces: usize) -> Result<Vec<Measured>> {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         let stamps = read_stamps(&self.gpu, self.stamps, pieces + 1)?;
@@ -163,7 +167,7 @@ impl Probe {
 }
 
 impl Counts {
-    /// In the order of their bits, which is that of the results.
+    /// In the order of their bits, which is the order of the results.
     const QUERIED: vk::QueryPipelineStatisticFlags = vk::QueryPipelineStatisticFlags::from_raw(
         vk::QueryPipelineStatisticFlags::VERTEX_SHADER_INVOCATIONS.as_raw()
             | vk::QueryPipelineStatisticFlags::CLIPPING_INVOCATIONS.as_raw()
@@ -179,13 +183,13 @@ impl From<[u64; 4]> for Counts {
 }
 
 impl Terrain {
-    /// As [`Terrain::draw`], piece by piece. `pieces` are those of the list, cut by [`pieces`] at [`DRAWS`].
+    /// Records a list piece by piece. `pieces` are those of the list, cut by [`pieces`] at [`DRAWS`].
     ///
     /// # Errors
     /// If a list changes its pipeline too often for the pools.
-    pub fn draw_probed(
+    pub(super) fn draw_probed(
         &self,
-        recording: &mut Recording,
+        recording: &Recording,
         list: &DrawList,
         probe: &Probe,
         pieces: &[Piece],
@@ -193,22 +197,18 @@ impl Terrain {
         if pieces.len() > DRAWS + PIPELINES {
             bail!("profile: {} pieces, at most {} can be measured", pieces.len(), DRAWS + PIPELINES);
         }
-        self.with_sky(recording, |recording| {
-            recording.scope("terrain", |r| {
-                probe.begin(r, pieces.len());
-                let mut next = 0;
-                self.each_run(r, list, 0, |r, run| {
-                    let first = &list.draws[run.start];
-                    r.gpu.begin_label(r.commands, pipeline_name(first.source, first.topology));
-                    while let Some(piece) = pieces.get(next).filter(|piece| run.contains(&piece.draws.start)) {
-                        probe.around(r, next, &piece.label, || self.submit(r, list, piece.draws.clone()));
-                        next += 1;
-                    }
-                    r.gpu.end_label(r.commands);
-                });
-                Ok(())
-            })
-        })
+        probe.begin(recording, pieces.len());
+        let mut next = 0;
+        self.each_run(recording, list, 0, |r, run| {
+            let first = &list.draws[run.start];
+            r.gpu.begin_label(r.commands, pipeline_name(first.source, first.topology));
+            while let Some(piece) = pieces.get(next).filter(|piece| run.contains(&piece.draws.start)) {
+                probe.around(r, next, &piece.label, || self.submit(r, list, piece.draws.clone()));
+                next += 1;
+            }
+            r.gpu.end_label(r.commands);
+        });
+        Ok(())
     }
 }
 

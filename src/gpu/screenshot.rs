@@ -1,4 +1,4 @@
-//! Copies the displayed image of one frame to host memory.
+//! A copy of one frame of the window.
 
 use std::sync::Arc;
 
@@ -9,12 +9,9 @@ use gpu_allocator::MemoryLocation;
 use super::device::Gpu;
 use super::frames::Recording;
 use super::memory::{Buffer, barriers, image_barrier, memory_barrier};
-use super::target::Attachment;
+use super::target::{Attachment, Use};
 
-/// Stage, access and layout of an image.
-type Use = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
-
-/// A host-visible buffer for one frame.
+/// The buffer of the copy.
 pub struct Screenshot {
     buffer: Buffer,
     size: [u32; 2],
@@ -22,7 +19,10 @@ pub struct Screenshot {
 }
 
 impl Screenshot {
-    /// Creates a buffer for a frame of this format and size in pixels. Fails if the format is not 8-bit RGBA or BGRA.
+    /// Makes the buffer for a frame of this format and size.
+    ///
+    /// # Errors
+    /// If pixels of the format are not four bytes, or the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, format: vk::Format, size: [u32; 2]) -> Result<Self> {
         use vk::Format as F;
         let is_bgra = match format {
@@ -35,7 +35,7 @@ impl Screenshot {
         Ok(Self { buffer: Buffer::new(gpu, "screenshot", bytes, usage, location)?, size, is_bgra })
     }
 
-    /// Records the copy of an image whose last use was `last`. Returns the image's use after the copy.
+    /// Records the copy of an image last used as `last`. Returns its use by the copy.
     pub(super) fn record(&self, recording: &Recording, image: Attachment, last: Use) -> Use {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
         let (gpu, commands) = (recording.gpu, recording.commands);
@@ -54,7 +54,7 @@ impl Screenshot {
         copied
     }
 
-    /// Returns the image. Call it once the frame has finished.
+    /// Returns the picture, once its frame has finished.
     ///
     /// # Panics
     /// Never: the buffer always matches the size.

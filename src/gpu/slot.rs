@@ -1,5 +1,5 @@
-//! What one frame in flight has of its own: data, instances, commands and streamed geometry, in buffers that the host
-//! writes while the device draws the frame before.
+//! Buffers of one frame in flight: uniforms, instances, commands and streamed geometry. The host writes them while the
+//! device draws the other frame.
 
 use std::sync::Arc;
 
@@ -18,50 +18,58 @@ use crate::draw::{Draw, DrawList, Limits, RESTART};
 /// Bytes of an indexed indirect command.
 pub(super) const COMMAND: usize = size_of::<vk::DrawIndexedIndirectCommand>();
 
-/// A part of a frame's list, drawn by a submission of its own while the rest is being selected.
+/// A part of a frame's list, submitted while the rest is still being selected.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
-    /// What of the list earlier parts hold.
+    /// Size of the earlier parts together.
     pub before: Limits,
-    /// Whether nothing of the list follows.
+    /// True for the last part.
     pub is_last: bool,
 }
 
 impl Part {
-    /// A whole list.
+    /// A whole list as its only part.
     pub fn whole() -> Self {
         Self { before: Limits::default(), is_last: true }
     }
 
-    /// Whether nothing of the frame was drawn before.
+    /// Returns true for the first part.
     pub fn is_first(&self) -> bool {
         self.before.draws == 0
     }
+
+    /// Returns true if the part is the whole list.
+    pub fn is_whole(&self) -> bool {
+        self.is_first() && self.is_last
+    }
 }
 
-/// What one frame in flight writes.
+/// Buffers and descriptors of one frame in flight.
 pub struct Slot {
     /// Descriptors of the frame's data and the scene's images.
     pub set: vk::DescriptorSet,
     frame: Buffer,
     /// Instances.
     pub instances: Buffer,
-    /// Indirect commands, one a draw.
+    /// Indirect commands, one per draw.
     pub commands: Buffer,
     /// Streamed vertices.
     pub vertices: Buffer,
-    /// Their normals.
+    /// Normals of the streamed vertices.
     pub normals: Buffer,
     /// Streamed indices.
     pub indices: Buffer,
-    /// Width of the streamed indices: 16 bits where all of the frame's fit.
+    /// Width of the streamed indices: 16 bits where all of them fit.
     pub index_type: vk::IndexType,
-    /// What is copied to resident geometry.
+    /// Staging memory of uploads to resident geometry.
     pub staging: Buffer,
 }
 
 impl Slot {
-    /// Room for every list within the limits.
+    /// Makes buffers for every list within the limits.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSet, limits: &Limits) -> Result<Self> {
         use vk::BufferUsageFlags as Usage;
         let host = |purpose, bytes: usize, usage| Buffer::host(gpu, purpose, bytes as u64, usage);
@@ -78,7 +86,7 @@ impl Slot {
         })
     }
 
-    /// Writes a frame's data, or a part of it.
+    /// Writes the data of a part of a frame.
     pub fn write(&mut self, frame: &Frame, list: &DrawList, part: &Part) {
         let before = &part.before;
         if part.is_first() {
@@ -88,10 +96,10 @@ impl Slot {
         append(&mut self.instances, before.instances, &list.instances);
         append(&mut self.vertices, before.vertices, &list.streamed.vertices);
         append(&mut self.normals, before.normals, &list.streamed.normals);
-        if part.is_first() && part.is_last {
+        if part.is_whole() {
             self.write_indices(&list.streamed.indices);
         } else {
-            // How wide the indices to come are is not known.
+            // Later parts may have indices of more than 16 bits.
             self.index_type = vk::IndexType::UINT32;
             append(&mut self.indices, before.indices, &list.streamed.indices);
         }
@@ -103,7 +111,7 @@ impl Slot {
     /// Writes the frame's streamed indices, 16 bits each if all of them fit.
     fn write_indices(&mut self, indices: &[u32]) {
         let highest = indices.iter().copied().filter(|&k| k != RESTART).fold(0, u32::max);
-        // The highest number of either kind ends a strip.
+        // The highest index of either width restarts a strip.
         if highest < u32::from(u16::MAX) {
             self.index_type = vk::IndexType::UINT16;
             self.indices.write_short(indices);
@@ -148,7 +156,7 @@ impl Slot {
     }
 }
 
-/// Writes what follows the first `before` items behind them.
+/// Writes the items from index `before` on to their place in the buffer.
 fn append<T: bytemuck::NoUninit>(buffer: &mut Buffer, before: usize, items: &[T]) {
     buffer.write(before * size_of::<T>(), cast_slice(&items[before..]));
 }

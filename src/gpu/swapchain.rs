@@ -1,6 +1,6 @@
-//! The window as a target: its surface, the images shown on it, and their way there.
+//! A window's surface and swapchain.
 //!
-//! What is expected — a window resized, hidden, moved to another monitor — is a status, not an error.
+//! Expected events, such as a window resized, hidden or moved to another monitor, are a status, not an error.
 
 use std::ffi::CStr;
 use std::sync::Arc;
@@ -14,14 +14,17 @@ use super::frames::{Recording, SLOTS};
 use super::instance::Instance;
 use super::memory::{Image, barriers, image_barrier};
 use super::screenshot::Screenshot;
-use super::target::{Attachment, DEPTH, Depth, Formats, depth_image};
+use super::target::{Attachment, Attachments, COLOUR_WRITTEN, DEPTH, Depth, Formats, depth_image};
 
-/// A window of the system, whoever made it.
+/// A window of the system.
 pub trait Window: HasWindowHandle + HasDisplayHandle {}
 
 impl<T: HasWindowHandle + HasDisplayHandle> Window for T {}
 
-/// Instance extensions that windows of this display need.
+/// Returns the instance extensions that windows of this display need.
+///
+/// # Errors
+/// If Vulkan has no surfaces for this kind of display.
 pub fn extensions(display: &dyn HasDisplayHandle) -> Result<Vec<&'static CStr>> {
     let names = ash_window::enumerate_required_extensions(display.display_handle()?.as_raw())
         .context("no Vulkan surfaces for this kind of display")?;
@@ -29,7 +32,7 @@ pub fn extensions(display: &dyn HasDisplayHandle) -> Result<Vec<&'static CStr>> 
     Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
 }
 
-/// Vulkan's side of a window. It keeps the window alive.
+/// The Vulkan surface of a window, which it keeps alive.
 pub struct Surface {
     loader: khr::surface::Instance,
     raw: vk::SurfaceKHR,
@@ -38,7 +41,10 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The surface of a window, on an instance that has [`extensions`].
+    /// Makes the surface of a window, on an instance with [`extensions`].
+    ///
+    /// # Errors
+    /// If the system refuses the surface.
     pub fn new(instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
         let (display, handle) = (window.display_handle()?.as_raw(), window.window_handle()?.as_raw());
         // SAFETY: the window outlives the surface, which holds it, and so does the instance.
@@ -48,7 +54,7 @@ impl Surface {
         Ok(Self { loader, raw, instance: Arc::clone(instance), window })
     }
 
-    /// Whether a device can show pictures on this surface.
+    /// Returns true if a device can present to this surface.
     pub fn is_shown_by(&self, candidate: &Candidate) -> bool {
         let instance = &self.instance.raw;
         // SAFETY: device and surface are of the same instance.
@@ -82,11 +88,12 @@ pub struct Swapchain {
     vsync: bool,
     size: [u32; 2],
     images: Vec<Shown>,
-    /// Whether frames are drawn with depth, and the image that they share once there are images.
+    /// True if frames are drawn with depth.
     has_depth: bool,
+    /// The depth image of all frames, made with the images.
     depth: Option<Image>,
     can_copy: bool,
-    /// Signalled when a slot's image may be drawn to.
+    /// One semaphore per slot, signalled when the slot's image may be drawn to.
     acquired: Vec<vk::Semaphore>,
     state: State,
     surface: Surface,
@@ -96,37 +103,42 @@ pub struct Swapchain {
 struct Shown {
     image: vk::Image,
     view: vk::ImageView,
-    /// Signalled when it is drawn. One an image, not one a slot: only the image's return says that the
-    /// presentation engine has waited for it.
+    /// Signalled when the image is drawn. One per image, not per slot: only the return of the image shows that the
+    /// presentation engine has waited for the semaphore.
     drawn: vk::Semaphore,
 }
 
-/// Whether the images fit the surface.
+/// Fit of the images to the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
+    /// The images have the properties of the surface.
     Fit,
-    /// They may be shown, but might be made to fit better.
+    /// The images can be shown, but others would fit better.
     Suboptimal,
-    /// They can no longer be shown.
+    /// The images can no longer be shown.
     Stale,
-    /// The surface itself is gone.
+    /// The surface is lost.
     Lost,
 }
 
-/// An image to draw to, acquired for one frame.
+/// An image acquired for one frame.
+#[derive(Clone, Copy)]
 pub struct Acquired {
-    /// The attachment for [`super::target::begin`].
-    pub attachment: Attachment,
-    /// What the frame waits for before it draws.
+    /// The image and the depth that goes with it.
+    pub attachments: Attachments,
+    /// The frame waits for this before it draws.
     pub wait: vk::Semaphore,
-    /// What the frame signals when it is drawn.
+    /// The frame signals this when it is drawn.
     pub signal: vk::Semaphore,
     index: u32,
 }
 
 impl Swapchain {
-    /// Images for a surface; made when [`Swapchain::fit`] is first called. `vsync`: never tears, waits for the
-    /// display; otherwise as fast as it can.
+    /// Makes a swapchain for a surface; [`Swapchain::fit`] makes the images. With `vsync` frames wait for the display,
+    /// else they are shown as fast as possible and may tear.
+    ///
+    /// # Errors
+    /// If the surface has no format.
     pub fn new(gpu: &Arc<Gpu>, surface: Surface, vsync: bool) -> Result<Self> {
         let format = preferred(&surface.formats(gpu.candidate.raw)?)?;
         let info = vk::SemaphoreCreateInfo::default();
@@ -151,12 +163,15 @@ impl Swapchain {
         })
     }
 
-    /// Formats to draw with.
+    /// Formats of the attachments.
     pub fn formats(&self) -> Formats {
         Formats { colour: self.format.format, depth: self.has_depth.then_some(DEPTH) }
     }
 
-    /// Says whether frames from now on are drawn with depth. It waits for the device.
+    /// Adds or removes depth for later frames. Waits for the device.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn set_depth(&mut self, has_depth: bool) -> Result<()> {
         if has_depth != self.has_depth {
             self.gpu.wait_idle()?;
@@ -170,8 +185,11 @@ impl Swapchain {
         self.has_depth.then(|| depth_image(&self.gpu, self.size, vk::ImageUsageFlags::empty())).transpose()
     }
 
-    /// Makes the images fit the window, whose size is `window` where the system leaves that to us. Returns the
-    /// size of a frame, or `None` while there is nothing to draw to: the window is minimised.
+    /// Makes the images fit the window. `window` is its size in pixels, used where the system leaves the size to the
+    /// program. Returns the size of a frame, or `None` while the window is minimised.
+    ///
+    /// # Errors
+    /// If the device fails or can no longer present to the window.
     pub fn fit(&mut self, window: [u32; 2]) -> Result<Option<[u32; 2]>> {
         if self.state == State::Fit && self.size == window {
             return Ok(Some(self.size));
@@ -202,7 +220,7 @@ impl Swapchain {
         unsafe { self.surface.loader.get_physical_device_surface_capabilities(device, self.surface.raw) }
     }
 
-    /// The surface was lost: a new one of the same window, and no images yet.
+    /// Replaces a lost surface by a new one of the same window, without images.
     fn replace_surface(&mut self) -> Result<()> {
         self.gpu.wait_idle()?;
         self.destroy_images();
@@ -218,7 +236,7 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Makes the images anew, handing the old ones over.
+    /// Makes new images and hands over the old ones.
     fn make(&mut self, capabilities: &vk::SurfaceCapabilitiesKHR, [width, height]: [u32; 2]) -> Result<()> {
         self.gpu.wait_idle()?;
         let max = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
@@ -258,7 +276,7 @@ impl Swapchain {
         Ok(())
     }
 
-    /// First in, first out unless there is a faster way and it is wanted: that one is always there.
+    /// Returns the present mode: FIFO, which every device has, unless a faster one is wanted and available.
     fn mode(&self) -> Result<vk::PresentModeKHR> {
         if self.vsync {
             return Ok(vk::PresentModeKHR::FIFO);
@@ -270,8 +288,11 @@ impl Swapchain {
         Ok(fast.into_iter().find(|mode| modes.contains(mode)).unwrap_or(vk::PresentModeKHR::FIFO))
     }
 
-    /// An image for the frame in this slot, which must have been waited for; `None` if there is none now: the
-    /// next [`Swapchain::fit`] sees to it.
+    /// Acquires an image for the frame in this slot, whose last frame has finished. Returns `None` if there is none now;
+    /// the next [`Swapchain::fit`] repairs that.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn acquire(&mut self, slot: usize) -> Result<Option<Acquired>> {
         const PATIENCE_NS: u64 = 1_000_000_000;
         let wait = self.acquired[slot];
@@ -282,21 +303,21 @@ impl Swapchain {
                 self.note(suboptimal);
                 index
             }
-            // A window that no one sees may not give its images back.
+            // A hidden window may not give its images back.
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
             Err(error) => return self.classify(error, "acquiring an image of the window").map(|()| None),
         };
         let Shown { image, view, drawn } = self.images[index as usize];
-        let attachment = Attachment { image, view, format: self.format.format, size: self.size };
-        Ok(Some(Acquired { attachment, wait, signal: drawn, index }))
+        let colour = Attachment { image, view, format: self.format.format, size: self.size };
+        let store = vk::AttachmentStoreOp::DONT_CARE;
+        let depth = self.depth.as_ref().map(|depth| Depth { image: depth.raw, view: depth.view, store });
+        Ok(Some(Acquired { attachments: Attachments { colour, depth }, wait, signal: drawn, index }))
     }
 
-    /// The depth image that goes with the images, if they are drawn with depth.
-    pub fn depth(&self) -> Option<Depth<'_>> {
-        self.depth.as_ref().map(|depth| (depth, vk::AttachmentStoreOp::DONT_CARE))
-    }
-
-    /// Room for a copy of one frame: made before the frame begins.
+    /// Makes the buffer for a copy of one frame, before the frame begins.
+    ///
+    /// # Errors
+    /// If the window's images cannot be copied, or the device is out of memory.
     pub fn screenshot(&self) -> Result<Screenshot> {
         if !self.can_copy {
             bail!("this window's pictures cannot be copied");
@@ -304,21 +325,23 @@ impl Swapchain {
         Screenshot::new(&self.gpu, self.format.format, self.size)
     }
 
-    /// Records the image's way to the screen, and its copy if wanted: after [`super::target::end`].
+    /// Records the copy of an image, if wanted, and its transition to the layout of presentation.
     pub fn finish(&self, recording: &Recording, acquired: &Acquired, screenshot: Option<&Screenshot>) {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-        let image = acquired.attachment;
-        let mut last =
-            (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
+        let image = acquired.attachments.colour;
+        let mut last = COLOUR_WRITTEN;
         if let Some(screenshot) = screenshot {
             last = screenshot.record(recording, image, last);
         }
-        // The semaphore that the presentation waits for makes writes visible to it.
+        // The semaphore makes the writes visible to the presentation.
         let shown = (Stage::NONE, Access::NONE, Layout::PRESENT_SRC_KHR);
         barriers(&self.gpu, recording.commands, &[image_barrier(image.image, image.format, last, shown)]);
     }
 
-    /// Shows an image whose frame was submitted.
+    /// Presents an image whose frame was submitted.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn present(&mut self, acquired: &Acquired) -> Result<()> {
         let (waits, chains, indices) = ([acquired.signal], [self.raw], [acquired.index]);
         let info = vk::PresentInfoKHR::default().wait_semaphores(&waits).swapchains(&chains).image_indices(&indices);
@@ -338,7 +361,7 @@ impl Swapchain {
         }
     }
 
-    /// Takes what is expected of a window as a status.
+    /// Turns expected errors of a window into a status.
     fn classify(&mut self, error: vk::Result, doing: &'static str) -> Result<()> {
         match error {
             vk::Result::ERROR_OUT_OF_DATE_KHR => self.state = State::Stale,
@@ -392,7 +415,7 @@ impl Drop for Swapchain {
     }
 }
 
-/// An sRGB format of 8 bits, else what there is.
+/// Returns an 8-bit sRGB format, else the first one.
 fn preferred(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
     let wanted = [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB, vk::Format::A8B8G8R8_SRGB_PACK32];
     let srgb = vk::ColorSpaceKHR::SRGB_NONLINEAR;
@@ -400,7 +423,7 @@ fn preferred(formats: &[vk::SurfaceFormatKHR]) -> Result<vk::SurfaceFormatKHR> {
     found.or(formats.first()).copied().context("the window has no format")
 }
 
-/// The surface's own size, or where that is left to us, the window's within the limits.
+/// Returns the surface's own size or, where it has none, the window's within the limits.
 fn extent(capabilities: &vk::SurfaceCapabilitiesKHR, window: [u32; 2]) -> [u32; 2] {
     let (own, low, high) = (capabilities.current_extent, capabilities.min_image_extent, capabilities.max_image_extent);
     if own.width != u32::MAX {

@@ -1,4 +1,4 @@
-//! Where frames are drawn: attachments that a frame begins and ends, and the offscreen picture read back.
+//! Targets of frames: attachments, rendering into them, and the offscreen picture that the host reads back.
 
 use std::sync::Arc;
 
@@ -7,22 +7,28 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 
 use super::device::Gpu;
-use super::frames::Recording;
+use super::frames::{Recording, Semaphores};
 use super::memory::{Buffer, Image, ImageInfo, aspect, barriers, image_barrier, memory_barrier};
+use super::passes::Pass;
+use super::terrain::Terrain;
+use crate::draw::DrawList;
+
+/// Stages, accesses and layout of one use of an image.
+pub(super) type Use = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
 
 /// Formats of the attachments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Formats {
     /// Colour.
     pub colour: vk::Format,
-    /// Depth: 32-bit float, reversed; `None`: there is none, and what is drawn last shows.
+    /// Depth: 32-bit float, reversed. Without depth a later draw hides an earlier one.
     pub depth: Option<vk::Format>,
 }
 
 /// Depth: 32-bit float, cleared to 0, the far plane.
 pub const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// A colour attachment to draw into, whoever owns it.
+/// A colour attachment, not owned.
 #[derive(Clone, Copy)]
 pub struct Attachment {
     /// The image.
@@ -35,38 +41,141 @@ pub struct Attachment {
     pub size: [u32; 2],
 }
 
-/// A depth attachment, and what becomes of its values after the frame.
-pub type Depth<'a> = (&'a Image, vk::AttachmentStoreOp);
+/// A depth attachment, not owned.
+#[derive(Clone, Copy)]
+pub struct Depth {
+    /// The image.
+    pub image: vk::Image,
+    /// Its view.
+    pub view: vk::ImageView,
+    /// Stores the values after the frame, or discards them.
+    pub store: vk::AttachmentStoreOp,
+}
 
-/// How a frame leaves its depth image.
-pub const DEPTH_WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
+/// The images that a frame is drawn into.
+#[derive(Clone, Copy)]
+pub struct Attachments {
+    /// The colours.
+    pub colour: Attachment,
+    /// The depth, if the frame is drawn with it.
+    pub depth: Option<Depth>,
+}
+
+/// State of a frame between its selection and its recording.
+pub struct Selected<'a> {
+    /// The scene's resources.
+    pub terrain: &'a Terrain,
+    /// The frame's slot.
+    pub slot: usize,
+    /// Milliseconds that selection took.
+    pub select_ms: f64,
+}
+
+/// The images that a frame is drawn into, and their use afterwards: read back, or shown in a window.
+pub trait Target {
+    /// Gets the images for the frame in this slot, which has begun. Returns false if there are none now: then the frame
+    /// is dropped.
+    ///
+    /// # Errors
+    /// If the device or the window fails.
+    fn acquire(&mut self, _slot: usize) -> Result<bool> {
+        Ok(true)
+    }
+
+    /// The images of the current frame.
+    fn attachments(&self) -> Attachments;
+
+    /// Reacts to the selected list, before the frame is recorded.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn selected(&mut self, _frame: &Selected, _list: &mut DrawList) -> Result<()> {
+        Ok(())
+    }
+
+    /// A pass of the target's own, drawn last.
+    fn overlay(&mut self) -> Option<&mut dyn Pass> {
+        None
+    }
+
+    /// Records copies and layout changes after the last pass.
+    fn finish(&self, recording: &Recording);
+
+    /// Semaphores of the frame's last submission.
+    fn semaphores(&self) -> Semaphores {
+        Semaphores::default()
+    }
+
+    /// Uses the frame once it is submitted.
+    ///
+    /// # Errors
+    /// If the device or the window fails.
+    fn present(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    /// True if the host waits until the device has finished the frame.
+    fn waits(&self) -> bool;
+}
+
+/// Colours as rendering leaves them.
+pub(super) const COLOUR_WRITTEN: Use = (
+    vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+);
+
+/// Colours as a later pass samples them.
+pub(super) const COLOUR_SAMPLED: Use = (
+    vk::PipelineStageFlags2::FRAGMENT_SHADER,
+    vk::AccessFlags2::SHADER_SAMPLED_READ,
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+);
+
+/// Depth as rendering leaves it.
+pub(super) const DEPTH_WRITTEN: Use = (
     vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS,
     vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
     vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
 );
 
-/// A depth image of the size of a target, for these uses beside that of an attachment.
+/// Depth as a later pass samples it.
+pub(super) const DEPTH_SAMPLED: Use = (
+    vk::PipelineStageFlags2::FRAGMENT_SHADER,
+    vk::AccessFlags2::SHADER_SAMPLED_READ,
+    vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL,
+);
+
+/// Makes a depth image of the size of a target, for these uses beside that of an attachment.
 pub fn depth_image(gpu: &Arc<Gpu>, size: [u32; 2], uses: vk::ImageUsageFlags) -> Result<Image> {
     let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | uses;
     Image::new(gpu, ImageInfo { purpose: "depth", size, layers: None, format: DEPTH, usage })
 }
 
-/// Begins drawing into an attachment, cleared to alpha 0 (no land) and the far plane.
-pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
+impl Image {
+    /// The image as a colour attachment.
+    pub(super) fn attachment(&self) -> Attachment {
+        Attachment { image: self.raw, view: self.view, format: self.format, size: self.size }
+    }
+}
+
+/// Begins rendering into attachments, cleared to alpha 0 (no terrain) and the far plane.
+pub(super) fn begin(recording: &Recording, Attachments { colour, depth }: Attachments) {
     use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-    let colour_write =
-        (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
     let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
     let depth_access = Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
-    // After the picture's last use: presented, or copied out.
-    let colour_used = (Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY, Access::NONE, Layout::UNDEFINED);
-    let before = image_barrier(colour.image, colour.format, colour_used, colour_write);
+    // Earlier uses of the colours: presented, copied, or sampled by a later pass.
+    let used = Stage::COLOR_ATTACHMENT_OUTPUT | Stage::COPY | Stage::FRAGMENT_SHADER;
+    let colour_used = (used, Access::NONE, Layout::UNDEFINED);
+    let before = image_barrier(colour.image, colour.format, colour_used, COLOUR_WRITTEN);
     match depth {
         None => barriers(recording.gpu, recording.commands, &[before]),
-        Some((image, _)) => {
-            // And the depth's: tested, copied out, or read by a pass of its own.
+        Some(depth) => {
+            // Earlier uses of the depth: tested, copied, or sampled by a later pass.
             let used = tests | Stage::COPY | Stage::FRAGMENT_SHADER;
-            let depth_before = image.barrier(
+            let depth_before = image_barrier(
+                depth.image,
+                DEPTH,
                 (used, Access::DEPTH_STENCIL_ATTACHMENT_WRITE, Layout::UNDEFINED),
                 (tests, depth_access, Layout::DEPTH_ATTACHMENT_OPTIMAL),
             );
@@ -76,8 +185,8 @@ pub fn begin(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
     open(recording, colour, depth, vk::AttachmentLoadOp::CLEAR);
 }
 
-/// Goes on drawing into an attachment over what an earlier submission of the same frame drew.
-pub fn go_on(recording: &Recording, colour: Attachment, depth: Option<Depth>) {
+/// Continues rendering into attachments, over what the same frame drew before.
+pub(super) fn resume(recording: &Recording, Attachments { colour, depth }: Attachments) {
     use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
     let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
     let stages = Stage::COLOR_ATTACHMENT_OUTPUT | tests;
@@ -98,9 +207,9 @@ fn open(recording: &Recording, colour: Attachment, depth: Option<Depth>, load: v
         .load_op(load)
         .store_op(vk::AttachmentStoreOp::STORE)
         .clear_value(clear)];
-    let depth = depth.map(|(image, store)| {
+    let depth = depth.map(|Depth { view, store, .. }| {
         vk::RenderingAttachmentInfo::default()
-            .image_view(image.view)
+            .image_view(view)
             .image_layout(Layout::DEPTH_ATTACHMENT_OPTIMAL)
             .load_op(load)
             .store_op(store)
@@ -121,9 +230,9 @@ fn open(recording: &Recording, colour: Attachment, depth: Option<Depth>, load: v
     }
 }
 
-/// Ends drawing.
-pub fn end(recording: &Recording) {
-    // SAFETY: `begin` was recorded in the same command buffer.
+/// Ends rendering.
+pub(super) fn end(recording: &Recording) {
+    // SAFETY: `begin` or `resume` was recorded in the same command buffer.
     unsafe { recording.gpu.raw.cmd_end_rendering(recording.commands) };
 }
 
@@ -134,21 +243,24 @@ pub struct Offscreen {
     depth: Option<DepthPicture>,
 }
 
-/// Depths in memory.
+/// The depth of a picture in memory.
 struct DepthPicture {
     image: Image,
     readback: Buffer,
 }
 
 impl Offscreen {
-    /// A picture of this size without depth, or which limit it exceeds.
+    /// Makes a picture of this size without depth.
+    ///
+    /// # Errors
+    /// If the size exceeds a limit of the device, or its memory.
     pub fn new(gpu: &Arc<Gpu>, size: [u32; 2]) -> Result<Self> {
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
         let info = ImageInfo { purpose: "colour", size, layers: None, format: Self::COLOUR, usage };
         Ok(Self { colour: Image::new(gpu, info)?, readback: readback(gpu, "read-back", size)?, depth: None })
     }
 
-    /// Gives it depth, unless it has it.
+    /// Makes the depth image, unless the picture has one.
     pub fn add_depth(&mut self, gpu: &Arc<Gpu>) -> Result<()> {
         if self.depth.is_none() {
             let (size, uses) = (self.colour.size, vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::SAMPLED);
@@ -165,15 +277,9 @@ impl Offscreen {
         Formats { colour: Self::COLOUR, depth: has_depth.then_some(DEPTH) }
     }
 
-    /// The attachment to draw into.
-    pub fn attachment(&self) -> Attachment {
-        let Image { raw, view, size, format, .. } = self.colour;
-        Attachment { image: raw, view, format, size }
-    }
-
-    /// The depth to draw with, if it has it; its values stay after the frame.
-    pub fn kept_depth(&self) -> Option<Depth<'_>> {
-        self.depth.as_ref().map(|depth| (&depth.image, vk::AttachmentStoreOp::STORE))
+    /// The picture as the target of one frame.
+    pub fn target(&self, draws_depth: bool, copies: Copies) -> OffscreenTarget<'_> {
+        OffscreenTarget { picture: self, draws_depth, copies }
     }
 
     /// The depth image.
@@ -188,19 +294,11 @@ impl Offscreen {
         self.depth.as_ref().expect("a picture with depth")
     }
 
-    /// Records the copy of the colours to the host, after [`end`].
-    pub fn read_back(&self, recording: &Recording) {
-        use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
-        let written =
-            (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
-        copy_out(recording, &self.colour, written, &self.readback);
-    }
-
-    /// Records the copy of the depth to the host, after [`end`]; the image stays as the frame left it.
+    /// Records the copy of the depth to the host; the image keeps the layout of an attachment.
     ///
     /// # Panics
     /// If it has no depth.
-    pub fn read_back_depth(&self, recording: &Recording) {
+    fn read_back_depth(&self, recording: &Recording) {
         use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
         let DepthPicture { image, readback } = self.depth_picture();
         copy_out(recording, image, DEPTH_WRITTEN, readback);
@@ -208,14 +306,14 @@ impl Offscreen {
         barriers(recording.gpu, recording.commands, &[image.barrier(copied, DEPTH_WRITTEN)]);
     }
 
-    /// The picture read back last (after the frame has finished); alpha says where land was drawn.
+    /// The picture copied last, once its frame has finished. Alpha is 0 where there is no terrain.
     pub fn picture(&self) -> image::RgbaImage {
         let [width, height] = self.colour.size;
         let bytes = &self.readback.read()[..4 * width as usize * height as usize];
         image::RgbaImage::from_raw(width, height, bytes.to_vec()).expect("as many bytes as pixels")
     }
 
-    /// The depth read back last, row by row from the top; 0 is infinitely far.
+    /// The depth copied last, row by row from the top; 0 is infinitely far.
     ///
     /// # Panics
     /// If it has no depth.
@@ -226,19 +324,52 @@ impl Offscreen {
     }
 }
 
-/// A buffer for colours or depths of a picture, which the host reads: both have four bytes a pixel.
+/// Copies of a picture to the host, recorded with its frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Copies {
+    /// Copies the colours.
+    pub colour: bool,
+    /// Copies the depth, which the picture must have.
+    pub depth: bool,
+}
+
+/// A picture in memory as the target of one frame.
+pub struct OffscreenTarget<'a> {
+    picture: &'a Offscreen,
+    draws_depth: bool,
+    copies: Copies,
+}
+
+impl Target for OffscreenTarget<'_> {
+    fn attachments(&self) -> Attachments {
+        let image = self.picture.depth.as_ref().filter(|_| self.draws_depth).map(|depth| &depth.image);
+        let depth =
+            image.map(|image| Depth { image: image.raw, view: image.view, store: vk::AttachmentStoreOp::STORE });
+        Attachments { colour: self.picture.colour.attachment(), depth }
+    }
+
+    fn finish(&self, recording: &Recording) {
+        if self.copies.colour {
+            copy_out(recording, &self.picture.colour, COLOUR_WRITTEN, &self.picture.readback);
+        }
+        if self.copies.depth {
+            self.picture.read_back_depth(recording);
+        }
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+}
+
+/// Makes a buffer for the host's copy of colours or depths: four bytes a pixel.
 fn readback(gpu: &Arc<Gpu>, purpose: &'static str, [width, height]: [u32; 2]) -> Result<Buffer> {
     let bytes = 4 * u64::from(width) * u64::from(height);
     Buffer::new(gpu, purpose, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu)
 }
 
 /// Records the copy of an image's single layer to a buffer that the host reads.
-fn copy_out(
-    recording: &Recording,
-    image: &Image,
-    written: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
-    to: &Buffer,
-) {
+fn copy_out(recording: &Recording, image: &Image, written: Use, to: &Buffer) {
     use vk::{AccessFlags2 as Access, ImageLayout as Layout, PipelineStageFlags2 as Stage};
     let (gpu, commands) = (recording.gpu, recording.commands);
     let copied = (Stage::COPY, Access::TRANSFER_READ, Layout::TRANSFER_SRC_OPTIMAL);

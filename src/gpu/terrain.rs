@@ -1,4 +1,4 @@
-//! The executor: a scene's resources, and draw lists turned into commands.
+//! A scene on the device: its geometry, textures and pipelines, and the commands that draw a list with them.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use crate::draw::{
 use crate::height::Field;
 use crate::plan::ScenePlan;
 
-/// Everything on the device that one scene and one technique need.
+/// Resources of one scene and one technique on the device.
 pub struct Terrain {
     gpu: Arc<Gpu>,
     pipelines: Pipelines,
@@ -34,12 +34,12 @@ pub struct Terrain {
     descriptors: vk::DescriptorPool,
     samplers: [Sampler; IMAGES],
     images: [Image; IMAGES],
-    /// What is laid over it in parts.
+    /// Virtual texture of the overlay or of the ground.
     pub overlay: Overlay,
     gpu_selector: Option<GpuSelector>,
 }
 
-/// Geometry that stays.
+/// Geometry that stays on the device from frame to frame.
 struct Resident {
     lattice: Buffer,
     vertices: Buffer,
@@ -47,11 +47,14 @@ struct Resident {
     indices: Buffer,
 }
 
-/// Sampled images of a scene.
+/// Number of sampled images of a scene.
 pub(super) const IMAGES: usize = 5;
 
 impl Terrain {
-    /// Makes the resources of a scene for a technique that keeps these on the device.
+    /// Makes the resources of a scene for a technique with this geometry, drawn to these formats.
+    ///
+    /// # Errors
+    /// If the scene exceeds a limit of the device, or its memory.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &ScenePlan,
@@ -85,7 +88,7 @@ impl Terrain {
         let resident = Resident::new(gpu, geometry.geometry)?;
         let gpu_selector = gpu_selector(gpu, geometry.gpu_selection)?;
         let overlay = Overlay::new(gpu, plan, field, overlay)?;
-        // Last: whoever fails before has none to destroy.
+        // Created last, so that earlier errors cannot leak it.
         let descriptors = descriptor_pool(gpu)?;
         let mut terrain = Self {
             gpu: Arc::clone(gpu),
@@ -116,8 +119,11 @@ impl Terrain {
         Ok(())
     }
 
-    /// Gives the scene another look: only pipelines are made anew, and what is laid over it in parts if that is another. The
-    /// plan must be of the same field on the same device, and the picture the one that the scene was made with.
+    /// Changes the look: makes the pipelines again, and the virtual texture if the plan has another one. Waits for the
+    /// device. Field, device and picture are those that the scene was made with.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn replan(
         &mut self,
         plan: &ScenePlan,
@@ -134,12 +140,15 @@ impl Terrain {
         Ok(())
     }
 
-    /// Draws from now on with other pipelines of the same scene, which get these in exchange.
-    pub fn exchange(&mut self, pipelines: &mut Pipelines) {
+    /// Swaps the pipelines for others of the same scene.
+    pub(super) fn exchange(&mut self, pipelines: &mut Pipelines) {
         std::mem::swap(&mut self.pipelines, pipelines);
     }
 
-    /// Gives the scene another technique: what comes from the field alone stays.
+    /// Changes the technique: geometry and frame buffers are made again, textures stay. Waits for the device.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn retarget(&mut self, geometry: DeviceGeometry) -> Result<()> {
         self.gpu.wait_idle()?;
         self.slots.clear();
@@ -150,7 +159,7 @@ impl Terrain {
         self.remake_slots()
     }
 
-    /// The device must be idle.
+    /// Makes the frame buffers again. The device must be idle.
     fn remake_slots(&mut self) -> Result<()> {
         self.slots.clear();
         // SAFETY: the device is idle and the slots that used the sets are gone.
@@ -158,32 +167,20 @@ impl Terrain {
         self.make_slots()
     }
 
-    /// The selection on the device, if the technique has a driver and the device can run it.
+    /// The selection on the device, if the technique has one and the device can run it.
     pub fn gpu_selector(&self) -> Option<&GpuSelector> {
         self.gpu_selector.as_ref()
     }
 
-    /// Writes a frame's data and records its uploads: before the target begins.
+    /// Writes a frame's data and records its uploads, before rendering begins: for callers with a frame of their own.
+    ///
+    /// # Errors
+    /// If the device fails.
     ///
     /// # Panics
     /// If the list exceeds the limits that its technique stated.
     pub fn prepare(&mut self, recording: &mut Recording, frame: &Frame, list: &DrawList) -> Result<()> {
-        self.prepare_part(recording, frame, list, &Part::whole())
-    }
-
-    /// The same for a part of a list.
-    ///
-    /// # Panics
-    /// If the list exceeds the limits that its technique stated.
-    pub fn prepare_part(
-        &mut self,
-        recording: &mut Recording,
-        frame: &Frame,
-        list: &DrawList,
-        part: &Part,
-    ) -> Result<()> {
-        assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
-        self.slots[recording.slot].write(frame, list, part);
+        self.write(recording.slot, frame, list, &Part::whole());
         if list.uploads.is_empty() {
             return Ok(());
         }
@@ -193,15 +190,30 @@ impl Terrain {
         })
     }
 
-    /// Records the selection of a list that the device fills: before the target begins.
+    /// Writes the data of a part of a frame for the device.
+    ///
+    /// # Panics
+    /// If the list exceeds the limits that its technique stated.
+    pub(super) fn write(&mut self, slot: usize, frame: &Frame, list: &DrawList, part: &Part) {
+        assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
+        self.slots[slot].write(frame, list, part);
+    }
+
+    /// Records the selection of a list that the device fills, before rendering begins.
+    ///
+    /// # Errors
+    /// If the technique has no selection for the device, or the device cannot run it.
     pub fn select(&mut self, recording: &mut Recording, list: &DrawList) -> Result<()> {
         if list.submission != Submission::GpuDriven {
             return Ok(());
         }
-        self.gpu_selector.as_mut().context("no selection on this device")?.select(recording, &list.parameters)
+        let gpu_selector = self.gpu_selector.as_mut().context("no selection on this device")?;
+        gpu_selector.select(recording, &list.parameters);
+        Ok(())
     }
 
-    fn upload(&mut self, recording: &Recording, uploads: &[Upload]) {
+    /// Copies changed geometry to the device.
+    pub(super) fn upload(&mut self, recording: &Recording, uploads: &[Upload]) {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         let read = (Stage::VERTEX_INPUT, Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ);
         let write = (Stage::COPY, Access::TRANSFER_WRITE);
@@ -232,40 +244,36 @@ impl Terrain {
         memory_barrier(&self.gpu, recording.commands, write, read);
     }
 
-    /// Records the land and the sky: between the target's begin and end.
+    /// Records a whole list and the sky within rendering: for callers with a frame of their own.
+    ///
+    /// # Errors
+    /// None at present.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        self.draw_part(recording, list, &Part::whole())
-    }
-
-    /// Records a part of the land, and the sky with the last part, or with the first one where there is no depth: between
-    /// the target's begin and end. What is run is counted for whole lists only.
-    pub fn draw_part(&self, recording: &mut Recording, list: &DrawList, part: &Part) -> Result<()> {
-        let record = |recording: &mut Recording| {
-            let is_whole = part.is_first() && part.is_last;
-            recording.counted_scope("terrain", is_whole, |r| {
-                self.each_run(r, list, part.before.draws, |r, run| self.submit(r, list, run));
-                Ok(())
-            })
-        };
-        let has_sky = if self.pipelines.has_depth { part.is_last } else { part.is_first() };
-        if has_sky { self.with_sky(recording, record) } else { record(recording) }
-    }
-
-    /// Records land, and the sky after it, where depth is 0 still; without depth before it.
-    pub(super) fn with_sky(
-        &self,
-        recording: &mut Recording,
-        record: impl FnOnce(&mut Recording) -> Result<()>,
-    ) -> Result<()> {
-        if self.pipelines.has_depth {
-            record(recording)?;
-            return self.draw_sky(recording);
+        let sky = |recording: &mut Recording| recording.scope("sky", |r| Ok(self.draw_sky(r)));
+        let has_depth = self.pipelines.has_depth;
+        if !has_depth {
+            sky(recording)?;
         }
-        self.draw_sky(recording)?;
-        record(recording)
+        recording.scope("terrain", |r| Ok(self.draw_part(r, list, &Part::whole())))?;
+        if has_depth { sky(recording) } else { Ok(()) }
     }
 
-    /// Calls `record` for each run of draws of one pipeline from one draw on, with that and its geometry bound.
+    /// Records the draws of a part of a list.
+    pub(super) fn draw_part(&self, r: &Recording, list: &DrawList, part: &Part) {
+        self.each_run(r, list, part.before.draws, |r, run| self.submit(r, list, run));
+    }
+
+    /// Records the sky: one triangle over the whole picture.
+    pub(super) fn draw_sky(&self, r: &Recording) {
+        // SAFETY: the pipeline outlives the frame; three vertices without input.
+        unsafe {
+            self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, self.pipelines.sky);
+            self.bind_scene(r);
+            self.gpu.raw.cmd_draw(r.commands, 3, 1, 0, 0);
+        }
+    }
+
+    /// Calls `record` for each run of draws with one pipeline, from draw `first` on. Pipeline and geometry are bound then.
     pub(super) fn each_run(
         &self,
         r: &Recording,
@@ -298,19 +306,7 @@ impl Terrain {
         unsafe { self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, pipeline) };
     }
 
-    fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
-        recording.scope("sky", |r| {
-            // SAFETY: the pipeline outlives the frame; three vertices without input.
-            unsafe {
-                self.gpu.raw.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::GRAPHICS, self.pipelines.sky);
-                self.bind_scene(r);
-                self.gpu.raw.cmd_draw(r.commands, 3, 1, 0, 0);
-            }
-            Ok(())
-        })
-    }
-
-    /// The layout of the descriptors of the frame and the scene's images.
+    /// Layout of the descriptors: the frame's data and the scene's images.
     pub fn set_layout(&self) -> vk::DescriptorSetLayout {
         self.pipelines.set_layout
     }
@@ -320,7 +316,7 @@ impl Terrain {
         self.slots[recording.slot].set
     }
 
-    /// Records draws of one run as the list says.
+    /// Records draws of one run, submitted as the list says.
     pub(super) fn submit(&self, r: &Recording, list: &DrawList, draws: Range<usize>) {
         let raw = &self.gpu.raw;
         match list.submission {

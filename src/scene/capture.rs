@@ -1,4 +1,4 @@
-//! What a stage really drew: its triangles captured on the device, and their error found there.
+//! The as-drawn mesh: triangles captured on the device, and their errors measured there.
 
 use anyhow::Result;
 
@@ -6,32 +6,37 @@ use super::SceneRenderer;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Captured;
 use crate::draw::{DrawList, Geometry, Submission};
-use crate::gpu::capture::{Capture, Part};
-use crate::gpu::error_pass::{self, ErrorPass, Summary};
+use crate::gpu::passes::capture::{Capture, Part};
+use crate::gpu::passes::error_pass::{self, ErrorPass, Summary};
+use crate::gpu::target::Copies;
 use crate::height::surface::{Corner, doubled_area};
 use crate::lod::Technique;
 use crate::view::View;
 
-/// A captured triangle: where it lies, and the positions that the rasteriser was given.
+/// A captured triangle: its corners, and the positions that the rasteriser was given.
 #[derive(Clone, Copy, Debug)]
 pub struct AsDrawn {
-    /// The triangle, as [`expand`] says it.
+    /// The triangle, in the form that [`expand`] gives it.
     pub drawn: Drawn,
     /// Corners relative to the eye, metres.
     pub relative: [[f32; 3]; 3],
 }
 
 impl SceneRenderer {
-    /// Whether the device can capture.
+    /// Returns true if the device can capture.
     pub fn captures(&self) -> bool {
         self.gpu.captures
     }
 
-    /// Every triangle of the last list's surface, and of its skirts, captured on the device for this view.
+    /// Captures every triangle of the last list: those of the surface, and those of skirts.
+    ///
+    /// # Errors
+    /// If the device cannot capture, or fails.
     pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<[Vec<AsDrawn>; 2]> {
         let mut found = [Vec::new(), Vec::new()];
         let resident = technique.resident();
-        self.each_batch(resident, view, |_, batch, list, records| {
+        self.each_batch(resident, view, |_, capture, batch, list| {
+            let records = capture.records();
             for part in batch {
                 triangles(resident, list, part, records, |drawn, corners| {
                     let relative = corners.map(|k| records[k as usize].relative);
@@ -43,41 +48,34 @@ impl SceneRenderer {
         Ok(found)
     }
 
-    /// Vertical errors in metres and screen errors in pixels of the last list, captured and measured on the device:
-    /// single precision, for what is too big for [`crate::measure::geometric::errors`].
+    /// Measures the last list on the device: vertical errors in metres and screen errors in pixels, single precision. For
+    /// lists too large for [`crate::measure::geometric::errors`].
+    ///
+    /// # Errors
+    /// If the device cannot capture, or fails.
     pub fn errors(&mut self, technique: &dyn Technique, view: &View) -> Result<[Summary; 2]> {
         let resident = technique.resident();
         let mut error_pass: Option<ErrorPass> = None;
-        self.each_batch(resident, view, |renderer, batch, list, records| {
-            if error_pass.is_none() {
-                let capture = renderer.capture.as_ref().expect("made before its first batch");
-                error_pass =
-                    Some(ErrorPass::new(&renderer.gpu, &renderer.plan, renderer.terrain.set_layout(), capture)?);
-            }
-            let error_pass = error_pass.as_mut().expect("just made");
+        self.each_batch(resident, view, |renderer, capture, batch, list| {
+            let layout = renderer.renderer.terrain.set_layout();
+            let pass = match &mut error_pass {
+                Some(pass) => pass,
+                none => none.insert(ErrorPass::new(&renderer.gpu, &renderer.plan, layout, capture)?),
+            };
             let mut surface = Vec::new();
             for part in batch {
-                triangles(resident, list, part, records, |drawn, corners| {
+                triangles(resident, list, part, capture.records(), |drawn, corners| {
                     // Skirts are no part of the surface.
                     if doubled_area(&drawn.corners) != 0 {
                         surface.push(corners);
                     }
                 });
             }
-            let frame = renderer.look.frame(&renderer.field, view, renderer.range);
             for some in surface.chunks(error_pass::TRIANGLES) {
-                let mut recording = renderer.frames.begin()?;
-                let nothing = DrawList {
-                    fraction_bits: list.fraction_bits,
-                    height_base: list.height_base,
-                    ..DrawList::default()
-                };
-                renderer.terrain.prepare(&mut recording, &frame, &nothing)?;
-                let scene = renderer.terrain.scene_set(&recording);
-                error_pass.record(&mut recording, scene, view.size, some)?;
-                renderer.frames.submit(None, None)?;
-                renderer.frames.finish()?;
-                error_pass.collect(some.len());
+                let DrawList { fraction_bits, height_base, .. } = *list;
+                let mut nothing = DrawList { fraction_bits, height_base, ..DrawList::default() };
+                renderer.draw_only(&mut pass.triangles(some), view, &mut nothing, Copies::default())?;
+                pass.collect(some.len());
             }
             Ok(())
         })?;
@@ -89,31 +87,27 @@ impl SceneRenderer {
         &mut self,
         resident: &Geometry,
         view: &View,
-        mut visit: impl FnMut(&mut SceneRenderer, &[Part], &DrawList, &[Captured]) -> Result<()>,
+        mut visit: impl FnMut(&mut SceneRenderer, &Capture, &[Part], &DrawList) -> Result<()>,
     ) -> Result<()> {
-        if self.capture.is_none() {
-            self.capture = Some(Capture::new(&self.gpu, &self.plan, self.terrain.set_layout())?);
-        }
+        let mut capture = match self.capture.take() {
+            Some(capture) => capture,
+            None => Capture::new(&self.gpu, &self.plan, self.renderer.terrain.set_layout())?,
+        };
         self.complete()?;
         let mut list = std::mem::take(&mut self.list);
-        // Instances that the device found are in the list now.
+        // The instances that the device found are in the list now.
         let submission = std::mem::replace(&mut list.submission, Submission::Direct);
-        // They were made when the list was drawn.
+        // The uploads were made when the list was drawn.
         list.uploads.clear();
-        let frame = self.look.frame(&self.field, view, self.range);
-        let batches = Capture::batches(resident, &list)?;
-        let visited = batches.iter().try_for_each(|batch| {
-            let capture = self.capture.as_mut().expect("made above");
-            capture.clear();
-            let mut recording = self.frames.begin()?;
-            self.terrain.prepare(&mut recording, &frame, &list)?;
-            capture.record(&mut recording, &self.terrain, batch)?;
-            self.frames.submit(None, None)?;
-            self.frames.finish()?;
-            let records = self.capture.as_ref().expect("made above").records().to_vec();
-            visit(self, batch, &list, &records)
+        let visited = Capture::batches(resident, &list).and_then(|batches| {
+            batches.iter().try_for_each(|batch| {
+                capture.clear();
+                self.draw_only(&mut capture.batch(batch), view, &mut list, Copies::default())?;
+                visit(self, &capture, batch, &list)
+            })
         });
         self.list = DrawList { submission, ..list };
+        self.capture = Some(capture);
         visited
     }
 }

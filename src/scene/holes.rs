@@ -1,4 +1,4 @@
-//! Pixels where the sky shines through land, and pixels of skirts.
+//! Pixels where the sky shines through the terrain, and pixels of skirts.
 
 use std::sync::Arc;
 
@@ -10,35 +10,41 @@ use crate::lod::{self, Settings, Technique, sorted_strips};
 use crate::measure::picture;
 use crate::view::{Tolerance, View};
 
-/// A tolerance at which what is not drawn is never seen, pixels.
+/// A tolerance below anything visible, pixels.
 const EXACT_PX: f64 = 1e-3;
 
-/// A view as brute force draws it: what other pictures of the view are held against.
+/// A view as brute force draws it: the reference for other pictures of the view.
 pub struct Truth {
-    /// Its picture; alpha says where land is.
+    /// The picture; alpha is 0 where there is no terrain.
     pub picture: image::RgbaImage,
     masks: Masks,
 }
 
-/// Where land is in a picture, pixel by pixel.
+/// Pixels of a picture with terrain.
 struct Masks {
     width: usize,
     terrain: Vec<bool>,
-    /// Pixels that land without data projects to, if there is such land.
+    /// Pixels of terrain without data, if there is any.
     missing: Option<Vec<bool>>,
 }
 
 impl Truth {
-    /// Draws it.
+    /// Draws the view.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn new(scene: &Scene, view: &View) -> Result<Self> {
         let picture = brute_force(scene, scene.field, view)?;
         Ok(Self { masks: Masks::new(scene, view, &picture)?, picture })
     }
 
-    /// Pixels, row by row, of a picture of the same view that are open although land covers all of their
-    /// neighbourhood in the truth. Where samples have no data, land within the tolerance of the truth may show what
-    /// the truth just hides: pixels that missing land projects to do not count. The neighbourhood does not end at the
-    /// edge of the picture: what is found beside it is looked at in a larger one.
+    /// Returns the hole pixels of a picture of the same view, numbered row by row. They show no terrain, although terrain
+    /// covers their whole neighbourhood in the reference. Pixels of terrain without data do not count: terrain within the
+    /// tolerance may show samples without data that the reference just hides. Holes near the edge are verified in a larger
+    /// picture, because their neighbourhood crosses the edge.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn hole_pixels(&self, scene: &Scene, view: &View, picture: &image::RgbaImage) -> Result<Vec<usize>> {
         let radius = picture::outline_radius(view.tolerance.px);
         let mut holes = self.masks.holes(&covered(picture), radius);
@@ -52,7 +58,7 @@ impl Truth {
     }
 }
 
-/// Hole pixels of a picture as they are found in the middle of a truth with as much land around it as they depend on.
+/// Returns the hole pixels of a picture against a larger reference, which contains their whole neighbourhoods.
 fn real_holes(scene: &Scene, view: &View, picture: &image::RgbaImage, radius: usize) -> Result<Vec<usize>> {
     let [inner, height] = view.size;
     let room = scene.gpu.device_limits().image_side.saturating_sub(inner.max(height)) / 2;
@@ -98,17 +104,17 @@ fn missing_terrain(scene: &Scene, view: &View) -> Result<Vec<bool>> {
     Ok(mask)
 }
 
-/// Where a skirt is seen, pixel by pixel: there alpha is half.
+/// Returns true for each pixel that shows a skirt: alpha is half there.
 pub fn skirts(picture: &image::RgbaImage) -> Vec<bool> {
     picture.pixels().map(|p| (1..255).contains(&p.0[3])).collect()
 }
 
-/// Where land was drawn, pixel by pixel.
+/// Returns true for each pixel that shows terrain.
 pub fn covered(picture: &image::RgbaImage) -> Vec<bool> {
     picture.pixels().map(|p| p.0[3] > 0).collect()
 }
 
-/// Every sample. A cave's are what the one technique that draws caves makes of them at next to no tolerance.
+/// Draws every sample. A cave is drawn by the only technique that can, at a tolerance of almost 0.
 fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::RgbaImage> {
     let is_cave = field.ceiling().is_some();
     let entry = lod::find(if is_cave { sorted_strips::ENTRY.name } else { "brute-force" }).expect("in the table");
@@ -119,7 +125,7 @@ fn brute_force(scene: &Scene, field: &Arc<Field>, view: &View) -> Result<image::
     let rendered = Scene { field, plan: &plan, ..scene.clone() }.render(technique.as_mut(), &view, 1)?;
     ensure!(
         !is_cave || rendered.list.tolerance_scale == 1.0,
-        "the cave has too many samples in sight for a picture of all"
+        "the cave has too many samples in view for a picture of all"
     );
     Ok(rendered.picture)
 }

@@ -1,55 +1,53 @@
-//! One field with one look on one device, drawn offscreen: pictures, draw lists and times for those who measure.
+//! A field drawn offscreen by a technique on a device: pictures, draw lists and times.
 
 pub mod capture;
-mod deep;
 pub mod holes;
-mod parts;
 pub mod probed;
 pub mod savings;
+mod source;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 
+use crate::draw::layout::Frame;
 use crate::draw::{DrawList, Submission};
-use crate::gpu::frames::{Frames, Timing};
+use crate::gpu::Gpu;
+use crate::gpu::frame_renderer::{FrameInput, FrameRenderer, HostSteps, SameList};
+use crate::gpu::frames::Timing;
 use crate::gpu::gpu_tile_cache::VirtualTextureStats;
-use crate::gpu::pipelines::Pipelines;
-use crate::gpu::slot::Part;
-use crate::gpu::target::Offscreen;
-use crate::gpu::terrain::Terrain;
-use crate::gpu::{Gpu, capture::Capture, probe::Probe, shading_only::ShadingOnly};
+use crate::gpu::passes::Pass;
+use crate::gpu::passes::capture::Capture;
+use crate::gpu::passes::shading_only::ShadingOnly;
+use crate::gpu::target::{Copies, Offscreen};
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
 use crate::view::View;
+use source::TechniqueSource;
 
-/// What is drawn, and on what.
+/// A field, its look, and the device that draws it.
 #[derive(Clone)]
 pub struct Scene<'a> {
     /// The device.
     pub gpu: &'a Arc<Gpu>,
     /// The field.
     pub field: &'a Arc<Field>,
-    /// What the scene needs.
+    /// Features of the scene's pipelines and resources.
     pub plan: &'a ScenePlan,
-    /// How it looks.
+    /// The look.
     pub look: &'a Look,
-    /// The picture laid over it.
+    /// A picture draped over the field.
     pub overlay: Option<&'a image::RgbaImage>,
 }
 
 /// A scene made ready on the device for one technique and one size of pictures.
 pub struct SceneRenderer {
-    frames: Frames,
-    terrain: Terrain,
+    renderer: FrameRenderer,
     shading_only: Option<ShadingOnly>,
     capture: Option<Capture>,
-    probe: Option<Probe>,
     offscreen: Offscreen,
-    /// What draws with depth where the plan has none.
-    deep: Option<Pipelines>,
     gpu: Arc<Gpu>,
     field: Arc<Field>,
     plan: ScenePlan,
@@ -57,13 +55,13 @@ pub struct SceneRenderer {
     range: [f32; 2],
     /// Seconds since the sun stood where the look says.
     pub time_s: f64,
-    /// How draws reach the device, if not as the technique says.
+    /// Submission of all draws; `None`: as the technique says.
     pub submission: Option<Submission>,
-    /// What was drawn last.
+    /// The list drawn last.
     pub list: DrawList,
 }
 
-/// What one frame took, milliseconds.
+/// Times of one frame, milliseconds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
     /// From the start of selection until the device has finished.
@@ -78,24 +76,24 @@ pub struct Times {
     pub gpu: Timing,
 }
 
-/// One picture and how it came about.
+/// One picture, its draw list and its times.
 pub struct RenderResult {
-    /// Colours; alpha says where land was drawn, half of it where a skirt was.
+    /// Colours. Alpha is 255 on terrain, half of that on a skirt, and 0 elsewhere.
     pub picture: image::RgbaImage,
-    /// What was drawn.
+    /// The list drawn last.
     pub list: DrawList,
-    /// What it took; medians if it was drawn several times.
+    /// Times; medians if the view was drawn several times.
     pub times: Times,
-    /// Device bytes in use while it was drawn.
+    /// Device bytes in use during drawing.
     pub device_bytes: u64,
-    /// The texels laid over in parts, if any are.
+    /// Statistics of the virtual texture, if there is one.
     pub maps: Option<VirtualTextureStats>,
 }
 
-/// What a frame copies back to the host after the device's work was timed.
+/// Copies of a frame to the host, made after the device's work was timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Copy {
-    /// Nothing.
+    /// None.
     Nothing,
     /// The colours: [`SceneRenderer::picture`].
     Picture,
@@ -104,22 +102,22 @@ pub enum Copy {
 }
 
 impl<'a> Scene<'a> {
-    /// Makes it ready for a technique.
+    /// Makes the scene ready for a technique, for pictures of a size in pixels.
+    ///
+    /// # Errors
+    /// If the scene exceeds a limit of the device, or its memory.
     pub fn renderer(&self, technique: &dyn Technique, size: [u32; 2]) -> Result<SceneRenderer> {
-        let kept = technique.device_geometry();
         let formats = Offscreen::formats(self.plan.has_depth());
         let mut offscreen = Offscreen::new(self.gpu, size)?;
         if self.plan.has_depth() {
             offscreen.add_depth(self.gpu)?;
         }
+        let geometry = technique.device_geometry();
         Ok(SceneRenderer {
-            frames: Frames::new(self.gpu, self.plan.measured)?,
-            terrain: Terrain::new(self.gpu, self.plan, self.field, self.overlay, kept, formats)?,
+            renderer: FrameRenderer::new(self.gpu, self.plan, self.field, self.overlay, geometry, formats, size)?,
             shading_only: None,
             capture: None,
-            probe: None,
             offscreen,
-            deep: None,
             gpu: Arc::clone(self.gpu),
             field: Arc::clone(self.field),
             plan: self.plan.clone(),
@@ -132,9 +130,12 @@ impl<'a> Scene<'a> {
     }
 
     /// Draws one view `times` times; the times are medians.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn render(&self, technique: &mut dyn Technique, view: &View, times: u32) -> Result<RenderResult> {
         let mut renderer = self.renderer(technique, view.size)?;
-        // Before anything is timed: a picture does not depend on how fast maps are made.
+        // Before anything is timed, so that the picture does not depend on the speed of loading.
         renderer.settle(technique, view)?;
         let drawn = (0..times.max(1)).map(|_| renderer.draw(technique, view, Copy::Picture)).collect::<Result<_>>()?;
         let device_bytes = self.gpu.device_bytes().values().sum();
@@ -151,21 +152,29 @@ impl<'a> Scene<'a> {
 }
 
 impl SceneRenderer {
-    /// Waits until the texels laid over in parts are as fine as a view needs.
+    /// Waits until the virtual texture is as fine as a view needs.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn settle(&mut self, technique: &mut dyn Technique, view: &View) -> Result<()> {
+        let overlay = &mut self.renderer.terrain.overlay;
         if self.plan.reads_lists() {
-            self.select(technique, view);
+            TechniqueSource::select_whole(technique, view, self.submission, &mut self.list);
+            overlay.see(view, technique.resident(), &self.list);
         }
-        self.terrain.overlay.settle(&self.gpu, view)
+        overlay.settle(&self.gpu, view)
     }
 
-    /// What is held of the texels laid over in parts, if any are.
+    /// Statistics of the virtual texture, if there is one.
     pub fn maps(&self) -> Option<VirtualTextureStats> {
-        self.terrain.overlay.stats()
+        self.renderer.terrain.overlay.stats()
     }
 
-    /// Selects and draws a view, and waits until the device has finished. Where a selection on the device finds more than
-    /// its tables hold, the host finds the tolerance at which it fits, and the frame is drawn again under that.
+    /// Selects and draws a view, and waits until the device has finished. If a selection on the device overflows its
+    /// tables, the host finds the tolerance at which the list fits, and the frame is drawn again under that tolerance.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn draw(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let times = self.draw_once(technique, view, copy)?;
         if self.list.submission != Submission::GpuDriven || self.list.tolerance_scale == 1.0 {
@@ -178,7 +187,7 @@ impl SceneRenderer {
         let wider = if tolerance_scale.is_finite() {
             self.draw_once(technique, &view.under_wider_tolerance(tolerance_scale), copy)?
         } else {
-            // No tolerance says what the host selects then.
+            // No tolerance fits, so the host selects by its own rules.
             let submission = self.submission.replace(Submission::default());
             let drawn = self.draw_once(technique, view, copy);
             self.submission = submission;
@@ -191,108 +200,121 @@ impl SceneRenderer {
 
     fn draw_once(&mut self, technique: &mut dyn Technique, view: &View, copy: Copy) -> Result<Times> {
         let started = Instant::now();
-        self.frames.counts_passed = copy == Copy::PictureAndDepth;
-        let before = self.select_in_parts(technique, view)?;
-        let select_ms = ms(started);
-        let list = std::mem::take(&mut self.list);
-        let last = self.record_part(view, &list, &Part { before, is_last: true });
-        self.list = list;
-        let (upload_ms, recorded) = last?;
-        let recording = self.frames.resume();
-        if copy != Copy::Nothing {
-            self.offscreen.read_back(&recording);
-        }
-        if copy == Copy::PictureAndDepth && self.plan.has_depth() {
-            self.offscreen.read_back_depth(&recording);
-        }
-        let record_ms = ms(recorded);
-        self.frames.submit(None, None)?;
-        self.frames.finish().context("drawing")?;
+        let has_depth = self.plan.has_depth();
+        let wants_depth = copy == Copy::PictureAndDepth;
+        let copies = Copies { colour: copy != Copy::Nothing, depth: wants_depth && has_depth };
+        let input = FrameInput { view, uniforms: self.uniforms(view), counts_passed: wants_depth, only: None };
+        let mut source = TechniqueSource::new(technique, view, self.submission);
+        let mut target = self.offscreen.target(has_depth, copies);
+        let steps = self.renderer.render(input, &mut source, &mut self.list, &mut target)?;
         self.read_draws();
-        let (frame_ms, gpu) = (ms(started), self.frames.timing.clone());
-        if copy == Copy::PictureAndDepth && !self.plan.has_depth() {
+        let times = self.times(started, steps)?;
+        if wants_depth && !has_depth {
             self.draw_deep(view)?;
         }
-        Ok(Times { frame_ms, select_ms, upload_ms, record_ms, gpu })
+        Ok(times)
     }
 
-    /// Selects on the device if that can and nothing else is asked for; and shows the list to what is laid over in parts.
-    fn select(&mut self, technique: &mut dyn Technique, view: &View) {
-        self.list.clear();
-        let own = self.submission.unwrap_or(Submission::GpuDriven);
-        if own == Submission::GpuDriven && self.terrain.gpu_selector().is_some() && !self.plan.reads_lists() {
-            technique.select_on_gpu(view, &mut self.list);
-        } else {
-            technique.select(view, &mut self.list);
-            self.list.submission = self.submission.unwrap_or(self.list.submission);
-        }
-        self.terrain.overlay.see(view, technique.resident(), &self.list);
+    fn uniforms(&self, view: &View) -> Frame {
+        self.look.after(self.time_s).frame(&self.field, view, self.range)
     }
 
-    /// The draws that the device found itself, once the frame has finished.
+    fn times(&self, started: Instant, steps: Option<HostSteps>) -> Result<Times> {
+        let steps = steps.context("an offscreen picture always has an image")?;
+        let of = |[start, end]: [Instant; 2]| (end - start).as_secs_f64() * 1e3;
+        Ok(Times {
+            frame_ms: ms(started),
+            select_ms: of(steps.select),
+            upload_ms: of(steps.upload),
+            record_ms: of(steps.record),
+            gpu: self.renderer.timing().clone(),
+        })
+    }
+
+    /// Draws the last list again with a depth buffer and copies that, for a plan without depth. The picture copied before
+    /// stays.
+    fn draw_deep(&mut self, view: &View) -> Result<()> {
+        self.offscreen.add_depth(&self.gpu)?;
+        self.renderer.add_depth()?;
+        let input = FrameInput { view, uniforms: self.uniforms(view), counts_passed: false, only: None };
+        let mut target = self.offscreen.target(true, Copies { colour: false, depth: true });
+        self.renderer.render(input, &mut SameList, &mut self.list, &mut target)?;
+        Ok(())
+    }
+
+    /// Reads the draws that the device found, once the frame has finished.
     fn read_draws(&mut self) {
-        if let (Submission::GpuDriven, Some(gpu_selector)) = (self.list.submission, self.terrain.gpu_selector()) {
-            gpu_selector.read_draws(gpu_selector.newest(), &mut self.list);
+        if let (Submission::GpuDriven, Some(selector)) = (self.list.submission, self.renderer.terrain.gpu_selector()) {
+            selector.read_draws(selector.newest(), &mut self.list);
         }
     }
 
-    /// Makes the list whole: instances that the device found itself are read back.
+    /// Completes the list: reads back the instances that the device found.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn complete(&mut self) -> Result<()> {
-        if let (Submission::GpuDriven, Some(gpu_selector)) = (self.list.submission, self.terrain.gpu_selector()) {
+        if let (Submission::GpuDriven, Some(selector)) = (self.list.submission, self.renderer.terrain.gpu_selector()) {
             let count = self.list.draws.iter().map(|draw| draw.instances.end).max().unwrap_or(0);
             if self.list.instances.len() < count as usize {
-                self.list.instances = gpu_selector.read_instances(count as usize)?;
+                self.list.instances = selector.read_instances(count as usize)?;
             }
         }
         Ok(())
     }
 
-    /// The same fragment work as the last frame's without its triangles: one pass over the whole picture, fed
-    /// the depth that the last frame left. `view` is that frame's.
+    /// Draws the fragment work of the last frame without its triangles: one full-screen pass that reads the depth of the
+    /// last frame. `view` is that frame's.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn draw_shading_only(&mut self, view: &View, copy: Copy) -> Result<Times> {
         if !self.plan.has_depth() {
             self.draw_deep(view)?;
         }
-        if self.shading_only.is_none() {
-            let layout = self.terrain.set_layout();
-            self.shading_only = Some(ShadingOnly::new(&self.gpu, &self.plan, layout, &self.offscreen)?);
-        }
-        let shading_only = self.shading_only.as_ref().expect("just made");
-        let frame = self.look.after(self.time_s).frame(&self.field, view, self.range);
+        let mut pass = match self.shading_only.take() {
+            Some(pass) => pass,
+            None => ShadingOnly::new(&self.gpu, &self.plan, &self.renderer.terrain, &self.offscreen)?,
+        };
+        let copies = Copies { colour: copy != Copy::Nothing, depth: false };
         let started = Instant::now();
-        let mut recording = self.frames.begin()?;
-        self.terrain.overlay.look(&mut recording, view)?;
-        self.terrain.prepare(&mut recording, &frame, &DrawList::default())?;
-        let upload_ms = ms(started);
-        let recorded = Instant::now();
-        let scene = self.terrain.scene_set(&recording);
-        shading_only.draw(&mut recording, &self.offscreen, scene)?;
-        if copy != Copy::Nothing {
-            self.offscreen.read_back(&recording);
-        }
-        let record_ms = ms(recorded);
-        self.frames.submit(None, None)?;
-        self.frames.finish().context("drawing the shading-only baseline")?;
-        Ok(Times { frame_ms: ms(started), select_ms: 0.0, upload_ms, record_ms, gpu: self.frames.timing.clone() })
+        let steps = self.draw_only(&mut pass, view, &mut DrawList::default(), copies)?;
+        let times = self.times(started, Some(steps))?;
+        self.shading_only = Some(pass);
+        Ok(Times { select_ms: 0.0, ..times })
     }
 
-    /// The last frame's colours, if it copied them; alpha says where land was drawn.
+    /// Draws a frame of one pass, and waits until the device has finished.
+    fn draw_only(
+        &mut self,
+        pass: &mut dyn Pass,
+        view: &View,
+        list: &mut DrawList,
+        copies: Copies,
+    ) -> Result<HostSteps> {
+        let input = FrameInput { view, uniforms: self.uniforms(view), counts_passed: false, only: Some(pass) };
+        let mut target = self.offscreen.target(true, copies);
+        let steps = self.renderer.render(input, &mut SameList, list, &mut target)?;
+        steps.context("an offscreen picture always has an image")
+    }
+
+    /// Colours of the last frame that copied them. Alpha is 0 where there is no terrain.
     pub fn picture(&self) -> image::RgbaImage {
         self.offscreen.picture()
     }
 
-    /// The last frame's depth, row by row from the top, if it copied it: near plane distance over distance along
-    /// the view axis in a perspective view, 0 where there is no land.
+    /// Depth of the last frame that copied it, row by row from the top. In a perspective view it is the distance of the near
+    /// plane divided by the distance along the view axis; 0 where there is no terrain.
     pub fn depth(&self) -> Vec<f32> {
         self.offscreen.depth_values()
     }
 }
 
 impl Times {
-    /// Each time's median; the passes are those of the frame with the median device time.
+    /// Returns the median of each time. The passes are those of the frame with the median device time.
     ///
     /// # Panics
-    /// If there are none.
+    /// If there are no frames.
     pub fn median(mut frames: Vec<Times>) -> Times {
         frames.sort_by(|a, b| a.gpu.total_ms.total_cmp(&b.gpu.total_ms));
         let of = |time: fn(&Times) -> f64| median(frames.iter().map(time).collect());

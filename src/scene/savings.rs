@@ -1,4 +1,4 @@
-//! What leaving a feature out saves: measured by keeping it once.
+//! The savings of features left out of a plan, measured by keeping each of them once.
 
 use anyhow::{Context, Result};
 
@@ -8,7 +8,7 @@ use crate::lod::Technique;
 use crate::plan::{FEATURES, Feature, ScenePlan, forced};
 use crate::view::View;
 
-/// What one feature would cost where nothing needs it.
+/// The cost of one feature that the scene does not need.
 #[derive(Clone, Debug)]
 pub struct Saving {
     /// The feature.
@@ -17,15 +17,15 @@ pub struct Saving {
     pub bytes: i64,
     /// Pipelines.
     pub pipelines: i64,
-    /// Shader instructions once constants are known, of all programs together.
+    /// Shader instructions of all shaders together, once constants are known.
     pub instructions: i64,
-    /// The device's time for a frame, as a ratio to that without it: median of frames drawn in turn.
+    /// Device time of a frame, as a ratio to that without the feature. Both are medians of frames drawn in turn.
     pub time: f64,
-    /// Largest difference of a colour channel between the two pictures, and the pixels that differ.
+    /// Largest difference of a colour channel between the two pictures, and the number of pixels that differ.
     pub differs: (u8, usize),
 }
 
-/// A scene as planned, what it takes, and a picture of it.
+/// The cost of a scene as planned.
 #[derive(Clone, Debug)]
 pub struct Lean {
     /// Device bytes.
@@ -34,12 +34,15 @@ pub struct Lean {
     pub pipelines: i64,
     /// Shader instructions.
     pub instructions: i64,
-    /// The device's time for a frame, milliseconds.
+    /// Device time of a frame, milliseconds.
     pub gpu_ms: f64,
 }
 
-/// Draws `frames` frames of a view with each feature that the scene's plan leaves out and that can be kept, and as
-/// many without, in turn. The techniques are two alike.
+/// Draws a view `frames` times with each feature that the plan leaves out and that can be kept, and as often without it,
+/// in turn. The two techniques are alike.
+///
+/// # Errors
+/// If the device fails, or the technique does not settle.
 pub fn measure(
     scene: &Scene,
     techniques: &mut [Box<dyn Technique>; 2],
@@ -77,7 +80,7 @@ fn more(with: [usize; 2], without: [usize; 2]) -> [i64; 2] {
     [0, 1].map(|k| with[k] as i64 - without[k] as i64)
 }
 
-/// Features that a plan leaves out and that can be kept, each with the plan that keeps it.
+/// Returns the features that a plan leaves out and that can be kept, each with the plan that keeps it.
 fn left_out(scene: &Scene) -> Result<Vec<(&'static Feature, ScenePlan)>> {
     let mut found = Vec::new();
     for feature in FEATURES.iter().filter(|feature| feature.can_be(true)) {
@@ -89,7 +92,7 @@ fn left_out(scene: &Scene) -> Result<Vec<(&'static Feature, ScenePlan)>> {
     Ok(found)
 }
 
-/// The stage of a scene once its technique has settled in a view, with the view's picture.
+/// Makes the renderer of a scene and draws a view until the technique has settled.
 fn settled(scene: &Scene, technique: &mut dyn Technique, view: &View) -> Result<SceneRenderer> {
     let mut renderer = scene.renderer(technique, view.size)?;
     for _ in 0..MAX_FRAMES {
@@ -101,14 +104,14 @@ fn settled(scene: &Scene, technique: &mut dyn Technique, view: &View) -> Result<
     None.context("the technique does not settle in the view")
 }
 
-/// Within so many frames of one view every technique settles.
+/// Most frames of one view until a technique has settled.
 const MAX_FRAMES: usize = 1000;
 
 fn bytes(scene: &Scene) -> i64 {
     scene.gpu.device_bytes().values().sum::<u64>() as i64
 }
 
-/// Where there are no timestamps, the host's.
+/// Returns the device time of a frame, or the host's time if the device has no timestamps.
 fn device_ms(times: &Times) -> f64 {
     if times.gpu.total_ms > 0.0 { times.gpu.total_ms } else { times.frame_ms }
 }

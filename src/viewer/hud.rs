@@ -1,16 +1,14 @@
-//! Lays out the statistics, the help and short notes over the image with egui; [`crate::gpu::hud`] draws them.
+//! The numbers over the picture, the help, and short notes: laid out by egui, drawn by [`crate::gpu::passes::hud`].
 //!
 //! The overlay takes no input. Every frame lays out all characters that may occur. The font texture is therefore
 //! complete from the start and never grows while frames are in flight.
 
 use std::sync::Arc;
 
-use egui::epaint::ClippedPrimitive;
-use egui::{
-    Align2, Color32, Context, FontId, Galley, LayerId, Painter, Pos2, RawInput, Rect, TexturesDelta, Vec2, ViewportId,
-};
+use egui::{Align2, Color32, Context, FontId, Galley, LayerId, Painter, Pos2, RawInput, Rect, Vec2, ViewportId};
 
 use super::bindings::Binding;
+use crate::gpu::passes::hud::Painted;
 
 const TEXT: Color32 = Color32::from_rgb(240, 240, 235);
 const FAINT: Color32 = Color32::from_rgb(180, 192, 204);
@@ -32,17 +30,7 @@ pub struct Content<'a> {
     pub note: Option<&'a str>,
 }
 
-/// The overlay of one frame, tessellated.
-pub struct Painted {
-    /// Texture changes to apply before drawing.
-    pub textures: TexturesDelta,
-    /// Meshes to draw.
-    pub primitives: Vec<ClippedPrimitive>,
-    /// Pixels per egui point.
-    pub pixels_per_point: f32,
-}
-
-/// Lays out the contents for a window of `size` pixels with a display scale factor.
+/// Lays the content out for a window of this size in pixels.
 pub fn paint(context: &Context, size: [u32; 2], scale: f32, content: &Content) -> Painted {
     let scale = if scale.is_finite() { scale.clamp(0.5, 8.0) } else { 1.0 };
     let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / scale);

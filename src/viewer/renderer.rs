@@ -1,79 +1,75 @@
-//! Everything of one window on the device, and how a frame is made of it.
+//! The renderer of one window: device, swapchain, HUD and technique.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Result;
 
 use super::Setup;
-use super::hud::Painted;
-use crate::draw::{DrawList, Submission};
-use crate::gpu::frames::Frames;
-use crate::gpu::hud::Hud;
+use crate::draw::{DrawList, Geometry, Submission};
+use crate::gpu::frame_renderer::{Allowed, DrawSource, FrameInput, FrameRenderer};
+use crate::gpu::passes::hud::{Hud, Painted};
 use crate::gpu::swapchain::{Surface, Swapchain, Window};
-use crate::gpu::terrain::Terrain;
-use crate::gpu::{Gpu, Instance, target};
+use crate::gpu::target::Selected;
+use crate::gpu::window_target::WindowTarget;
+use crate::gpu::{Gpu, Instance};
 use crate::lod::{Entry, Settings, Technique};
 use crate::plan::{Look, ScenePlan};
 use crate::texture::virtual_overlay;
 use crate::view::View;
 
-/// Device, window target, terrain and technique.
+/// Device, swapchain, HUD and technique of one window.
 pub struct WindowRenderer {
-    terrain: Terrain,
+    renderer: FrameRenderer,
     hud: Hud,
-    frames: Frames,
     swapchain: Swapchain,
     gpu: Arc<Gpu>,
     technique: Box<dyn Technique>,
     list: DrawList,
     range: [f32; 2],
-    /// Whether lists are looked at on the host before they are drawn.
-    reads_lists: bool,
-    /// What the last frame took and held.
+    /// Times and counts of the last frame.
     pub stats: FrameStats,
 }
 
-/// Figures of one frame.
+/// Times and counts of one frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameStats {
     /// Selection, milliseconds.
     pub select_ms: f64,
-    /// Recording, milliseconds.
+    /// Uploads and recording, milliseconds.
     pub record_ms: f64,
-    /// The device, milliseconds; of a frame before.
+    /// Device time of an earlier frame, milliseconds.
     pub gpu_ms: f64,
     /// Triangles.
     pub triangles: u64,
     /// Draws.
     pub draws: usize,
-    /// What the tolerance was multiplied by: 1 where it was kept.
+    /// Factor by which the tolerance was increased; 1 if it was kept.
     pub tolerance_scale: f64,
-    /// Error allowed, pixels.
+    /// Tolerance, pixels.
     pub tolerance_px: f64,
-    /// The texels laid over in parts, if any are.
+    /// Statistics of the virtual texture, if there is one.
     pub maps: Option<virtual_overlay::VirtualTextureStats>,
 }
 
-/// What a frame shows.
+/// A frame to show.
 pub struct FrameRequest<'a> {
-    /// From where.
+    /// The view.
     pub view: &'a View,
-    /// How.
+    /// The look.
     pub look: &'a Look,
-    /// Whether the last selection stays.
+    /// True if the last list is drawn again.
     pub frozen: bool,
-    /// Whether a copy is wanted.
+    /// True if the frame is copied.
     pub wants_copy: bool,
 }
 
 /// A frame that was shown.
 pub struct Shown {
-    /// Its copy, if one was wanted and the window's pictures can be copied.
+    /// The copy of the frame, if one was wanted and the window's images can be copied.
     pub copy: Option<image::RgbaImage>,
 }
 
-/// What the scene needs.
+/// Makes the plan of the scene.
 fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Result<ScenePlan> {
     let (limits, picture) = (gpu.device_limits(), setup.overlay.as_ref().map(|picture| picture.dimensions().into()));
     let plan = ScenePlan::builder(&setup.field, look, &limits).overlay(picture).windowed();
@@ -81,7 +77,10 @@ fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Res
 }
 
 impl WindowRenderer {
-    /// Makes everything for a window.
+    /// Makes device, swapchain, HUD and technique for a window.
+    ///
+    /// # Errors
+    /// If no device can present to the window, or the scene exceeds its limits.
     pub fn new(setup: &Setup, instance: &Arc<Instance>, window: Arc<dyn Window>) -> Result<Self> {
         let surface = Surface::new(instance, window)?;
         let gpu = Gpu::for_window(instance, &setup.choice, |candidate| surface.is_shown_by(candidate))?;
@@ -90,117 +89,128 @@ impl WindowRenderer {
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         swapchain.set_depth(plan.has_depth())?;
-        let formats = swapchain.formats();
+        let (picture, geometry) = (setup.overlay.as_ref(), technique.device_geometry());
+        let (formats, size) = (swapchain.formats(), setup.view.size);
+        let renderer = FrameRenderer::new(&gpu, &plan, &setup.field, picture, geometry, formats, size)?;
         Ok(Self {
-            terrain: Terrain::new(
-                &gpu,
-                &plan,
-                &setup.field,
-                setup.overlay.as_ref(),
-                technique.device_geometry(),
-                formats,
-            )?,
-            hud: Hud::new(&gpu, formats)?,
-            frames: Frames::new(&gpu, plan.measured)?,
+            hud: Hud::new(&gpu, renderer.overlay_formats())?,
+            renderer,
             swapchain,
             technique,
             list: DrawList::default(),
             range: setup.field.range(),
-            reads_lists: plan.reads_lists(),
             stats: FrameStats::default(),
             gpu,
         })
     }
 
-    /// The device's name.
+    /// Name of the device.
     pub fn device(&self) -> &str {
         &self.gpu.candidate.name
     }
 
-    /// Changes the look: pipelines, and what is laid over in parts.
+    /// Changes the look. Waits for the device.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn set_look(&mut self, setup: &Setup, look: &Look) -> Result<()> {
         let plan = plan(&self.gpu, setup, look, self.technique.as_ref())?;
-        let before = self.swapchain.formats();
+        let before = self.renderer.overlay_formats();
         self.swapchain.set_depth(plan.has_depth())?;
-        let formats = self.swapchain.formats();
-        if formats != before {
-            self.hud.reformat(formats)?;
-        }
-        self.reads_lists = plan.reads_lists();
-        self.terrain.replan(&plan, &setup.field, setup.overlay.as_ref(), formats)
+        let (formats, picture) = (self.swapchain.formats(), setup.overlay.as_ref());
+        self.renderer.replan(&plan, &setup.field, picture, formats)?;
+        let formats = self.renderer.overlay_formats();
+        if formats != before { self.hud.reformat(formats) } else { Ok(()) }
     }
 
-    /// Changes the technique: its geometry, the slots' room, and pipelines for what it needs.
+    /// Changes the technique: its geometry, the sizes of the frame buffers, and the pipelines. Waits for the device.
+    ///
+    /// # Errors
+    /// If the technique does not fit the field or the device.
     pub fn set_technique(&mut self, setup: &Setup, look: &Look, entry: &Entry, settings: &Settings) -> Result<()> {
         self.technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         self.list.clear();
-        self.terrain.retarget(self.technique.device_geometry())?;
+        self.renderer.retarget(self.technique.device_geometry())?;
         self.set_look(setup, look)
     }
 
-    /// The size of the next frame in a window of this size; `None` while it is minimised.
+    /// Returns the size of the next frame in a window of this size, pixels; `None` while it is minimised.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn fit(&mut self, window: [u32; 2]) -> Result<Option<[u32; 2]>> {
-        self.swapchain.fit(window)
+        let size = self.swapchain.fit(window)?;
+        size.map(|size| self.renderer.fit(size)).transpose()?;
+        Ok(size)
     }
 
-    /// Draws and shows a frame; `overlay` lays out what lies over it, from its figures. `None`: the window could
-    /// not take it, and the frame was dropped before anything was selected.
+    /// Draws and shows a frame. `overlay` lays out the HUD from the frame's numbers. Returns `None` if the window could not
+    /// take the frame, which was dropped before selection.
+    ///
+    /// # Errors
+    /// If the device fails.
     pub fn show(
         &mut self,
         setup: &Setup,
         request: &FrameRequest,
         overlay: impl FnOnce(&FrameStats) -> Painted,
     ) -> Result<Option<Shown>> {
-        let copy = if request.wants_copy { self.swapchain.screenshot().ok() } else { None };
-        let mut recording = self.frames.begin()?;
-        let slot = recording.slot;
-        let Some(image) = self.swapchain.acquire(recording.slot)? else { return Ok(None) };
-        let started = Instant::now();
-        if request.frozen {
-            // They were made when the list was drawn first.
-            self.list.uploads.clear();
-        } else {
-            // Where there is too much for the device the host widens the tolerance until it fits.
-            let selects_on_gpu =
-                self.terrain.gpu_selector().is_some() && self.list.tolerance_scale == 1.0 && !self.reads_lists;
-            self.list.clear();
-            let select = if selects_on_gpu { <dyn Technique>::select_on_gpu } else { <dyn Technique>::select };
-            select(self.technique.as_mut(), request.view, &mut self.list);
-        }
-        self.terrain.overlay.see(request.view, self.technique.resident(), &self.list);
-        self.stats.select_ms = ms(started);
-        // Draws that the device finds are those of a frame before, which has finished.
-        if let (Submission::GpuDriven, Some(gpu_selector)) = (self.list.submission, self.terrain.gpu_selector()) {
-            gpu_selector.read_draws(slot, &mut self.list);
-        }
-        let list = &self.list;
-        (self.stats.triangles, self.stats.draws) = (list.triangles(), list.draws.len());
-        (self.stats.tolerance_scale, self.stats.tolerance_px) = (list.tolerance_scale, request.view.tolerance.px);
-        let mut overlay = overlay(&self.stats);
-        self.hud.update(std::mem::take(&mut overlay.textures))?;
-        let started = Instant::now();
-        self.terrain.overlay.look(&mut recording, request.view)?;
-        self.stats.maps = self.terrain.overlay.stats();
-        let frame = request.look.frame(&setup.field, request.view, self.range);
-        self.terrain.prepare(&mut recording, &frame, &self.list)?;
-        self.terrain.select(&mut recording, &self.list)?;
-        target::begin(&recording, image.attachment, self.swapchain.depth());
-        self.terrain.draw(&mut recording, &self.list)?;
-        let Painted { primitives, pixels_per_point, .. } = &mut overlay;
-        self.hud.draw(&mut recording, request.view.size, *pixels_per_point, primitives)?;
-        target::end(&recording);
-        self.swapchain.finish(&recording, &image, copy.as_ref());
-        self.stats.record_ms = ms(started);
-        self.frames.submit(Some(image.wait), Some(image.signal))?;
-        self.swapchain.present(&image)?;
-        self.stats.gpu_ms = self.frames.timing.total_ms;
-        if copy.is_some() {
-            self.frames.finish()?;
-        }
+        let Self { renderer, hud, swapchain, technique, list, stats, .. } = self;
+        let copy = if request.wants_copy { swapchain.screenshot().ok() } else { None };
+        let (view, mut overlay) = (request.view, Some(overlay));
+        let mut source = ShownSource { technique: technique.as_mut(), request };
+        let lay_out = |frame: &Selected, list: &mut DrawList| {
+            stats.select(frame, list, view);
+            overlay.take().map_or_else(Painted::default, |overlay| overlay(stats))
+        };
+        let mut target = WindowTarget::new(swapchain, hud, copy.as_ref(), lay_out);
+        let uniforms = request.look.frame(&setup.field, view, self.range);
+        let input = FrameInput { view, uniforms, counts_passed: false, only: None };
+        let Some(steps) = renderer.render(input, &mut source, list, &mut target)? else { return Ok(None) };
+        stats.record_ms = (steps.record[1] - steps.upload[0]).as_secs_f64() * 1e3;
+        stats.gpu_ms = renderer.timing().total_ms;
+        stats.maps = renderer.terrain.overlay.stats();
         Ok(Some(Shown { copy: copy.map(|copy| copy.picture()) }))
     }
 }
 
-fn ms(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e3
+impl FrameStats {
+    /// Takes over the numbers of a frame that was selected.
+    fn select(&mut self, frame: &Selected, list: &mut DrawList, view: &View) {
+        self.select_ms = frame.select_ms;
+        // The draws that the device finds are those of an earlier frame, which has finished.
+        if let (Submission::GpuDriven, Some(selector)) = (list.submission, frame.terrain.gpu_selector()) {
+            selector.read_draws(frame.slot, list);
+        }
+        (self.triangles, self.draws) = (list.triangles(), list.draws.len());
+        (self.tolerance_scale, self.tolerance_px) = (list.tolerance_scale, view.tolerance.px);
+    }
+}
+
+/// Selects the view of a request, or keeps the last list of a frozen one.
+struct ShownSource<'a> {
+    technique: &'a mut dyn Technique,
+    request: &'a FrameRequest<'a>,
+}
+
+impl DrawSource for ShownSource<'_> {
+    fn select(&mut self, allowed: Allowed, list: &mut DrawList, _: &mut dyn FnMut(&DrawList)) {
+        if self.request.frozen {
+            // The uploads were made when the list was drawn first.
+            list.uploads.clear();
+            return;
+        }
+        // After an overflow on the device the host finds a tolerance that fits.
+        let on_gpu = allowed.on_gpu && list.tolerance_scale == 1.0;
+        list.clear();
+        if on_gpu {
+            self.technique.select_on_gpu(self.request.view, list);
+        } else {
+            self.technique.select(self.request.view, list);
+        }
+    }
+
+    fn resident(&self) -> Option<&Geometry> {
+        Some(self.technique.resident())
+    }
 }

@@ -1,6 +1,7 @@
 //! Tests of the architecture: allowed module dependencies, where Vulkan may be named, and the maximum file length.
 
 mod circles;
+mod frames;
 mod paths;
 mod words;
 

@@ -17,7 +17,13 @@ use cuesta::view::View;
 use super::{as_f32, aslant, mountains, on_device, technique};
 
 /// Returns all vertices of every third instance that a technique draws, with its weights or random ones.
-fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], are_weights_random: bool) -> Vec<Query> {
+fn lattice_queries(
+    field: &Arc<Field>,
+    view: &View,
+    name: &str,
+    settings: &[&str],
+    are_weights_random: bool,
+) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
@@ -59,7 +65,8 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
         }
     };
     let are_weights_random = morph == Morph::ByInstance;
-    let of_config = |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, are_weights_random);
+    let of_config =
+        |(name, settings): &(&str, &[&str])| lattice_queries(field, view, name, settings, are_weights_random);
     let mut queries: Vec<_> = configs.iter().flat_map(of_config).collect();
     let explicit = (0..2000u32).map(|k| Query {
         vertex: ExplicitVertex {

@@ -1,8 +1,7 @@
-//! The as-drawn mesh: what the vertex programs made of a draw list on the device.
+//! Pass `capture`: writes the vertices of a draw list, as the vertex shaders place them, to a buffer for the host.
 //!
-//! A variant of each vertex program (`CAPTURE` in `shaders/emit.glsl`) writes every vertex it places to a storage
-//! buffer, from the same buffers and through the same pipelines' input as when drawing. A list is captured in
-//! batches of parts, as many as the buffer holds.
+//! A variant of each vertex shader (`CAPTURE` in `shaders/emit.glsl`) writes every vertex it places to a storage
+//! buffer. Vertex buffers and vertex input are those of drawing. A list is captured in batches that fit the buffer.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,31 +10,40 @@ use anyhow::{Result, bail};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
-use super::bindings::{Bindings, Bound};
-use super::device::Gpu;
-use super::frames::Recording;
-use super::memory::{Buffer, memory_barrier};
-use super::pipelines::{self, Pass};
-use super::terrain::Terrain;
+use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::draw::layout::{Captured, CapturedPart};
 use crate::draw::{Draw, DrawList, Geometry, RESTART, Source, Topology, expand};
+use crate::gpu::bindings::{Bindings, Bound};
+use crate::gpu::device::Gpu;
+use crate::gpu::frames::Recording;
+use crate::gpu::memory::{Buffer, memory_barrier};
+use crate::gpu::pipelines;
+use crate::gpu::terrain::Terrain;
 use crate::plan::ScenePlan;
 
-/// Triangles in a part of a draw.
+pub(super) static ROW: Row = Row {
+    name: "capture",
+    reads: &[Resource::Uniforms, Resource::Geometry],
+    writes: &[Resource::Vertices],
+    occurs: Occurs::Last,
+    origin: Origin::Caller,
+};
+
+/// Most triangles in a part of a draw.
 const PART: usize = 1 << 15;
-/// Records that the buffer holds: 1.4 million, 32 MiB.
+/// Records in the buffer: 1.4 million, 32 MiB.
 const RECORDS: usize = (32 << 20) / size_of::<Captured>();
 
-/// A part of a draw, and where its vertices go.
+/// A part of a draw, and the place of its vertices in the buffer.
 pub struct Part {
     /// The part.
     pub draw: Draw,
-    /// Where its records lie in the buffer.
+    /// The place of its records.
     pub place: CapturedPart,
 }
 
 impl Part {
-    /// The record of an instance's vertex.
+    /// Returns the index of the record of an instance's vertex.
     pub fn record(&self, instance: u32, index: u32) -> usize {
         let (instance, vertex) = (instance - self.place.first_instance, index - self.place.first_vertex);
         (self.place.base + instance * self.place.vertices + vertex) as usize
@@ -56,7 +64,10 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Makes what capturing a scene needs; `scene` is the layout of its descriptors.
+    /// Makes pipelines and buffer for a scene; `scene` is the layout of its descriptors.
+    ///
+    /// # Errors
+    /// If the device lacks `vertexPipelineStoresAndAtomics`, or memory.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout) -> Result<Self> {
         if !gpu.captures {
             bail!("{}: vertexPipelineStoresAndAtomics is missing: as-drawn capture needs it", gpu.candidate.name);
@@ -68,13 +79,17 @@ impl Capture {
         let bindings = Bindings::new(gpu, "capture", Some(scene), vk::ShaderStageFlags::VERTEX, &bound, constants)?;
         let mut capture = Self { gpu: Arc::clone(gpu), bindings, pipelines: BTreeMap::new(), buffer };
         for (source, topology) in pipelines::draws(plan) {
-            let pipeline = pipelines::terrain(gpu, capture.bindings.layout, plan, Pass::Capture, source, topology)?;
+            let pipeline =
+                pipelines::terrain(gpu, capture.bindings.layout, plan, pipelines::Pass::Capture, source, topology)?;
             capture.pipelines.insert((source, topology), pipeline);
         }
         Ok(capture)
     }
 
-    /// A list in batches whose vertices fit the buffer.
+    /// Cuts a list into batches whose vertices fit the buffer.
+    ///
+    /// # Errors
+    /// If one instance of a part exceeds the buffer.
     pub fn batches(resident: &Geometry, list: &DrawList) -> Result<Vec<Vec<Part>>> {
         let mut batches: Vec<Vec<Part>> = Vec::new();
         let mut used = RECORDS;
@@ -110,54 +125,67 @@ impl Capture {
         Ok(batches)
     }
 
-    /// Fills the buffer with what no vertex program writes (a height that is no number).
+    /// Fills the buffer with heights that are no number, which no vertex shader writes.
     pub fn clear(&mut self) {
         self.buffer.fill(0xff);
     }
 
-    /// Records the capture of a batch. The recording was prepared with the list it comes from.
-    pub fn record(&self, recording: &mut Recording, terrain: &Terrain, batch: &[Part]) -> Result<()> {
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: 1, height: 1 } };
-        let info = vk::RenderingInfo::default().render_area(area).layer_count(1);
-        let viewport = [vk::Viewport { width: 1.0, height: 1.0, max_depth: 1.0, ..Default::default() }];
-        recording.scope("capture", |r| {
-            let (raw, commands, graphics) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::GRAPHICS);
-            // SAFETY: what is bound outlives the frame; ranges lie in the bound buffers.
-            unsafe {
-                raw.cmd_begin_rendering(commands, &info);
-                raw.cmd_set_viewport(commands, 0, &viewport);
-                raw.cmd_set_scissor(commands, 0, &[area]);
-                let (sets, layout) = ([terrain.scene_set(r), self.bindings.set], self.bindings.layout);
-                raw.cmd_bind_descriptor_sets(commands, graphics, layout, 0, &sets, &[]);
-                for Part { draw, place } in batch {
-                    let source = if draw.source == Source::Streamed { Source::Resident } else { draw.source };
-                    raw.cmd_bind_pipeline(commands, graphics, self.pipelines[&(source, draw.topology)]);
-                    terrain.bind_geometry(r, draw.source);
-                    let stage = vk::ShaderStageFlags::VERTEX;
-                    raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(place));
-                    let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
-                    let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
-                    let offset = draw.first_vertex as i32;
-                    raw.cmd_draw_indexed(commands, indices, instances, first_index, offset, first_instance);
-                }
-                raw.cmd_end_rendering(commands);
-            }
-            Ok(())
-        })?;
-        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let written = (Stage::VERTEX_SHADER, Access::SHADER_STORAGE_WRITE);
-        let read = (Stage::HOST | Stage::COMPUTE_SHADER, Access::HOST_READ | Access::SHADER_STORAGE_READ);
-        memory_barrier(&self.gpu, recording.commands, written, read);
-        Ok(())
+    /// The pass of one frame: captures a batch of the frame's list.
+    pub fn batch<'a>(&'a self, parts: &'a [Part]) -> Batch<'a> {
+        Batch { capture: self, parts }
     }
 
-    /// The records of a batch, once its frame has finished.
+    /// Returns the records of a batch, once its frame has finished.
     pub fn records(&self) -> &[Captured] {
         bytemuck::cast_slice(&self.buffer.read()[..RECORDS * size_of::<Captured>()])
     }
 }
 
-/// A part in pieces of instances that fit the buffer, if one instance does.
+/// The capture of one batch.
+pub struct Batch<'a> {
+    capture: &'a Capture,
+    parts: &'a [Part],
+}
+
+impl Pass for Batch<'_> {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn record(&mut self, r: &mut Recording, scene: &mut Terrain, _: &PassInput) -> Result<()> {
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width: 1, height: 1 } };
+        let info = vk::RenderingInfo::default().render_area(area).layer_count(1);
+        let viewport = [vk::Viewport { width: 1.0, height: 1.0, max_depth: 1.0, ..Default::default() }];
+        let (raw, commands, graphics) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::GRAPHICS);
+        // SAFETY: what is bound outlives the frame; ranges lie in the bound buffers.
+        unsafe {
+            raw.cmd_begin_rendering(commands, &info);
+            raw.cmd_set_viewport(commands, 0, &viewport);
+            raw.cmd_set_scissor(commands, 0, &[area]);
+            let (sets, layout) = ([scene.scene_set(r), self.capture.bindings.set], self.capture.bindings.layout);
+            raw.cmd_bind_descriptor_sets(commands, graphics, layout, 0, &sets, &[]);
+            for Part { draw, place } in self.parts {
+                let source = if draw.source == Source::Streamed { Source::Resident } else { draw.source };
+                raw.cmd_bind_pipeline(commands, graphics, self.capture.pipelines[&(source, draw.topology)]);
+                scene.bind_geometry(r, draw.source);
+                let stage = vk::ShaderStageFlags::VERTEX;
+                raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(place));
+                let (indices, instances) = (draw.indices.len() as u32, draw.instances.len() as u32);
+                let (first_index, first_instance) = (draw.indices.start, draw.instances.start);
+                let offset = draw.first_vertex as i32;
+                raw.cmd_draw_indexed(commands, indices, instances, first_index, offset, first_instance);
+            }
+            raw.cmd_end_rendering(commands);
+        }
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let written = (Stage::VERTEX_SHADER, Access::SHADER_STORAGE_WRITE);
+        let read = (Stage::HOST | Stage::COMPUTE_SHADER, Access::HOST_READ | Access::SHADER_STORAGE_READ);
+        memory_barrier(r.gpu, commands, written, read);
+        Ok(())
+    }
+}
+
+/// Cuts a part into pieces of instances that fit the buffer.
 fn split(part: Part) -> Vec<Part> {
     let max = (RECORDS / part.place.vertices as usize).max(1);
     let last = part.draw.instances.end;

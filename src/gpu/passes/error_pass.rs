@@ -1,5 +1,6 @@
-//! The error of captured triangles, found on the device: for fields and lists too big for the exact oracle on the
-//! CPU (`measure::geometric`), whose rules it follows in single precision.
+//! Pass `error pass`: measures the error of captured triangles on the device, in single precision.
+//!
+//! For fields and lists too large for the exact CPU reference, `measure::geometric`, whose rules it follows.
 
 use std::sync::Arc;
 
@@ -7,33 +8,43 @@ use anyhow::Result;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
-use super::bindings::{Bindings, Bound};
 use super::capture::Capture;
-use super::device::Gpu;
-use super::frames::Recording;
-use super::memory::{Buffer, memory_barrier};
-use super::pipelines;
-use super::shaders::Constants;
+use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::draw::layout::{ErrorPassInput, TriangleError};
+use crate::gpu::bindings::{Bindings, Bound};
+use crate::gpu::device::Gpu;
+use crate::gpu::frames::Recording;
+use crate::gpu::memory::{Buffer, memory_barrier};
+use crate::gpu::pipelines;
+use crate::gpu::shaders::Constants;
+use crate::gpu::terrain::Terrain;
 use crate::plan::ScenePlan;
 
-/// Triangles measured at once.
+pub(super) static ROW: Row = Row {
+    name: "error pass",
+    reads: &[Resource::Uniforms, Resource::Vertices],
+    writes: &[Resource::Errors],
+    occurs: Occurs::Last,
+    origin: Origin::Caller,
+};
+
+/// Most triangles measured in one frame.
 pub const TRIANGLES: usize = 1 << 20;
 /// Classes of a histogram: the upper 12 bits of a positive float, 16 to an octave.
 const CLASSES: usize = 4096;
 const HISTOGRAM: usize = 2 * CLASSES * size_of::<u32>();
 const WORKGROUP: u32 = 64;
 
-/// A quantity over all samples in view.
+/// Statistics of a quantity over all samples in view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// Samples.
+    /// Number of samples.
     pub count: u64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
-    /// A value that 99.9 % of the samples do not exceed, at most a sixteenth of an octave (6.25 %) too large.
+    /// Percentile 99.9, at most a sixteenth of an octave (6.25 %) too large.
     pub p999: f64,
-    /// Largest.
+    /// Maximum.
     pub max: f64,
 }
 
@@ -48,7 +59,7 @@ pub struct ErrorPass {
     sums: Sums,
 }
 
-/// What was found so far.
+/// Sums over the triangles measured so far.
 #[derive(Default)]
 struct Sums {
     samples: u64,
@@ -58,7 +69,11 @@ struct Sums {
 }
 
 impl ErrorPass {
-    /// Makes what measuring a scene needs, reading the vertices of a capture.
+    /// Makes pipeline and buffers for a scene, reading the vertices of a capture. `scene` is the layout of the scene's
+    /// descriptors.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: vk::DescriptorSetLayout, capture: &Capture) -> Result<Self> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let bytes = (TRIANGLES * size_of::<[u32; 3]>()) as u64;
@@ -74,43 +89,13 @@ impl ErrorPass {
         Ok(Self { gpu, bindings, pipeline, triangles, errors, histogram, sums })
     }
 
-    /// Forgets what was found.
-    pub fn reset(&mut self) {
-        self.sums = Sums::default();
+    /// The pass of one frame: measures at most [`TRIANGLES`] triangles, three captured records each. An earlier frame
+    /// captured the records.
+    pub fn triangles<'a>(&'a mut self, triangles: &'a [[u32; 3]]) -> Triangles<'a> {
+        Triangles { pass: self, triangles }
     }
 
-    /// Records the measuring of at most [`TRIANGLES`] triangles, three captured records each; `scene` are the
-    /// descriptors of the view, and the capture of the records was recorded before.
-    pub fn record(
-        &mut self,
-        recording: &mut Recording,
-        scene: vk::DescriptorSet,
-        size: [u32; 2],
-        triangles: &[[u32; 3]],
-    ) -> Result<()> {
-        self.triangles.write(0, bytemuck::cast_slice(triangles));
-        self.histogram.write(0, &[0; HISTOGRAM]);
-        let given = ErrorPassInput { half_size: size.map(|n| n as f32 / 2.0), triangles: triangles.len() as u32 };
-        let (layout, set, pipeline) = (self.bindings.layout, self.bindings.set, self.pipeline);
-        recording.scope("error pass", |r| {
-            let (raw, commands, point) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::COMPUTE);
-            // SAFETY: what is bound outlives the frame.
-            unsafe {
-                raw.cmd_bind_pipeline(commands, point, pipeline);
-                raw.cmd_bind_descriptor_sets(commands, point, layout, 0, &[scene, set], &[]);
-                let stage = vk::ShaderStageFlags::COMPUTE;
-                raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(&given));
-                raw.cmd_dispatch(commands, given.triangles.div_ceil(WORKGROUP), 1, 1);
-            }
-            Ok(())
-        })?;
-        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let written = (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE);
-        memory_barrier(&self.gpu, recording.commands, written, (Stage::HOST, Access::HOST_READ));
-        Ok(())
-    }
-
-    /// Adds what the last recording found, once its frame has finished.
+    /// Adds the errors of the last frame, once that has finished.
     pub fn collect(&mut self, triangles: usize) {
         let errors: &[TriangleError] =
             bytemuck::cast_slice(&self.errors.read()[..triangles * size_of::<TriangleError>()]);
@@ -126,7 +111,7 @@ impl ErrorPass {
         sums.classes.iter_mut().zip(classes).for_each(|(sum, &class)| *sum += u64::from(class));
     }
 
-    /// Vertical errors in metres and screen errors in pixels, of all that was collected since the last reset.
+    /// Returns vertical errors in metres and screen errors in pixels, over all triangles collected.
     pub fn summaries(&self) -> [Summary; 2] {
         let sums = &self.sums;
         [0, 1].map(|k| Summary {
@@ -138,7 +123,44 @@ impl ErrorPass {
     }
 }
 
-/// Upper end of the class in which the value lies that 99.9 % of the samples do not exceed.
+/// The measurement of some triangles.
+pub struct Triangles<'a> {
+    pass: &'a mut ErrorPass,
+    triangles: &'a [[u32; 3]],
+}
+
+impl Pass for Triangles<'_> {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn prepare(&mut self, _: usize, _: &mut Terrain, _: &PassInput) -> bool {
+        self.pass.triangles.write(0, bytemuck::cast_slice(self.triangles));
+        self.pass.histogram.write(0, &[0; HISTOGRAM]);
+        true
+    }
+
+    fn record(&mut self, r: &mut Recording, scene: &mut Terrain, input: &PassInput) -> Result<()> {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let half_size = input.view.size.map(|n| n as f32 / 2.0);
+        let given = ErrorPassInput { half_size, triangles: self.triangles.len() as u32 };
+        let (raw, commands, point) = (&r.gpu.raw, r.commands, vk::PipelineBindPoint::COMPUTE);
+        let (layout, sets) = (self.pass.bindings.layout, [scene.scene_set(r), self.pass.bindings.set]);
+        // SAFETY: what is bound outlives the frame.
+        unsafe {
+            raw.cmd_bind_pipeline(commands, point, self.pass.pipeline);
+            raw.cmd_bind_descriptor_sets(commands, point, layout, 0, &sets, &[]);
+            let stage = vk::ShaderStageFlags::COMPUTE;
+            raw.cmd_push_constants(commands, layout, stage, 0, bytemuck::bytes_of(&given));
+            raw.cmd_dispatch(commands, given.triangles.div_ceil(WORKGROUP), 1, 1);
+        }
+        let written = (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_WRITE);
+        memory_barrier(r.gpu, commands, written, (Stage::HOST, Access::HOST_READ));
+        Ok(())
+    }
+}
+
+/// Returns the upper end of the class that holds percentile 99.9.
 fn percentile(classes: &[u64], samples: u64) -> f64 {
     let mut beyond = samples / 1000;
     for (class, &count) in classes.iter().enumerate().rev() {
