@@ -336,10 +336,12 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
         (11, UINT, offset_of!(Instance, rotation)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
-        (14, UINT, offset_of!(Instance, weights_kind)),
         (15, WEIGHTS, offset_of!(Instance, weights_words)),
     ];
-    let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
+    // Explicit vertices have weights of one kind: their shader does not read the tag.
+    let tag = (source == Source::Lattice).then_some((14, UINT, offset_of!(Instance, weights_kind)));
+    let instance = instance.into_iter().chain(tag).map(attribute(1));
+    let attributes = vertex.into_iter().map(attribute(0)).chain(instance).collect();
     (stride as u32, attributes)
 }
 
