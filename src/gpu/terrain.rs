@@ -249,12 +249,20 @@ impl Terrain {
     /// # Errors
     /// None at present.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        let sky = |recording: &mut Recording| recording.scope("sky", |r| Ok(self.draw_sky(r)));
+        let sky = |recording: &mut Recording| {
+            recording.scope("sky", |r| {
+                self.draw_sky(r);
+                Ok(())
+            })
+        };
         let has_depth = self.pipelines.has_depth;
         if !has_depth {
             sky(recording)?;
         }
-        recording.scope("terrain", |r| Ok(self.draw_part(r, list, &Part::whole())))?;
+        recording.scope("terrain", |r| {
+            self.draw_part(r, list, &Part::whole());
+            Ok(())
+        })?;
         if has_depth { sky(recording) } else { Ok(()) }
     }
 
