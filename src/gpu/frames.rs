@@ -64,8 +64,8 @@ pub struct Recording<'a> {
     pub commands: vk::CommandBuffer,
     /// The slot's number, below [`SLOTS`].
     pub slot: usize,
-    state: &'a mut Slot,
-    measured: bool,
+    /// Queries of the frame; none in a command buffer that another renderer began.
+    queries: Option<&'a mut Slot>,
 }
 
 impl Frames {
@@ -107,7 +107,7 @@ impl Frames {
     pub fn resume(&mut self) -> Recording<'_> {
         let state = &mut self.slots[self.next];
         let commands = state.commands[state.current];
-        Recording { gpu: &self.gpu, commands, slot: self.next, state, measured: self.measured }
+        Recording { gpu: &self.gpu, commands, slot: self.next, queries: self.measured.then_some(state) }
     }
 
     /// Submits what is recorded of a frame so far; the rest is recorded into another command buffer.
@@ -158,7 +158,13 @@ impl Frames {
     }
 }
 
-impl Recording<'_> {
+impl<'a> Recording<'a> {
+    /// Wraps a command buffer that another renderer began. Passes in it are labelled but not timed. `slot` is below
+    /// [`Gpu::frames_in_flight`], and the commands recorded before under the same slot have finished.
+    pub fn of_caller(gpu: &'a Arc<Gpu>, commands: vk::CommandBuffer, slot: usize) -> Self {
+        Self { gpu, commands, slot, queries: None }
+    }
+
     /// Records a pass under one name: debug label and timestamps.
     pub fn scope<T>(&mut self, name: &'static str, record: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         self.counted_scope(name, false, record)
@@ -171,40 +177,21 @@ impl Recording<'_> {
         counts: bool,
         record: impl FnOnce(&mut Self) -> Result<T>,
     ) -> Result<T> {
-        let commands = self.commands;
-        self.gpu.begin_label(commands, name);
-        let timed = self.measured && (self.state.scopes.len() as u32) < SCOPES;
-        let first = 2 * self.state.scopes.len() as u32;
-        let counted = timed && counts && self.state.statistics != vk::QueryPool::null();
-        // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
-        unsafe {
-            if timed {
-                self.state.scopes.push(name);
-                stamp(self.gpu, commands, vk::PipelineStageFlags2::TOP_OF_PIPE, self.state.stamps, first);
-            }
-            if counted {
-                self.state.has_statistics = true;
-                let flags = vk::QueryControlFlags::empty();
-                self.gpu.raw.cmd_begin_query(commands, self.state.statistics, 0, flags);
-            }
-            if counted && self.state.counts_passed {
-                self.gpu.raw.cmd_begin_query(commands, self.state.passed, 0, vk::QueryControlFlags::PRECISE);
-            }
+        let (gpu, commands) = (self.gpu, self.commands);
+        gpu.begin_label(commands, name);
+        let first = self.queries.as_mut().and_then(|queries| queries.begin_scope(gpu, commands, name));
+        let counted = first.is_some() && counts;
+        if let (true, Some(queries)) = (counted, &mut self.queries) {
+            queries.begin_counts(gpu, commands);
         }
         let result = record(self);
-        // SAFETY: the queries begun above are ended in the same command buffer.
-        unsafe {
-            if counted && self.state.counts_passed {
-                self.gpu.raw.cmd_end_query(commands, self.state.passed, 0);
-            }
+        if let (Some(first), Some(queries)) = (first, &mut self.queries) {
             if counted {
-                self.gpu.raw.cmd_end_query(commands, self.state.statistics, 0);
+                queries.end_counts(gpu, commands);
             }
-            if timed {
-                stamp(self.gpu, commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, self.state.stamps, first + 1);
-            }
+            stamp(gpu, commands, vk::PipelineStageFlags2::BOTTOM_OF_PIPE, queries.stamps, first + 1);
         }
-        self.gpu.end_label(commands);
+        gpu.end_label(commands);
         result
     }
 }
@@ -259,6 +246,44 @@ impl Slot {
         }
     }
 
+    /// Stamps the start of a pass and returns the stamp's number, or nothing if all stamps are taken.
+    fn begin_scope(&mut self, gpu: &Gpu, commands: vk::CommandBuffer, name: &'static str) -> Option<u32> {
+        if self.scopes.len() as u32 >= SCOPES {
+            return None;
+        }
+        let first = 2 * self.scopes.len() as u32;
+        self.scopes.push(name);
+        stamp(gpu, commands, vk::PipelineStageFlags2::TOP_OF_PIPE, self.stamps, first);
+        Some(first)
+    }
+
+    fn begin_counts(&mut self, gpu: &Gpu, commands: vk::CommandBuffer) {
+        if self.statistics == vk::QueryPool::null() {
+            return;
+        }
+        self.has_statistics = true;
+        // SAFETY: the command buffer is being recorded and the queries were reset at the frame's start.
+        unsafe {
+            gpu.raw.cmd_begin_query(commands, self.statistics, 0, vk::QueryControlFlags::empty());
+            if self.counts_passed {
+                gpu.raw.cmd_begin_query(commands, self.passed, 0, vk::QueryControlFlags::PRECISE);
+            }
+        }
+    }
+
+    fn end_counts(&mut self, gpu: &Gpu, commands: vk::CommandBuffer) {
+        if self.statistics == vk::QueryPool::null() {
+            return;
+        }
+        // SAFETY: `begin_counts` began the queries in the same command buffer.
+        unsafe {
+            if self.counts_passed {
+                gpu.raw.cmd_end_query(commands, self.passed, 0);
+            }
+            gpu.raw.cmd_end_query(commands, self.statistics, 0);
+        }
+    }
+
     fn timing(&self, gpu: &Gpu) -> Result<Timing> {
         let stamps = read_stamps(gpu, self.stamps, 2 * self.scopes.len())?;
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
@@ -286,7 +311,7 @@ impl Drop for Frames {
     fn drop(&mut self) {
         // SAFETY: the device is idle before anything goes.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             for slot in &self.slots {
                 self.gpu.raw.destroy_query_pool(slot.stamps, None);
                 self.gpu.raw.destroy_query_pool(slot.statistics, None);

@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 
 use super::device::Gpu;
-use super::frames::{Recording, SLOTS, once};
+use super::frames::{Recording, once};
 use super::height_pages::{self, Sampler, Sampling};
 use super::memory::{Buffer, Image, ImageInfo, barriers};
 use crate::draw::{DrawList, Geometry};
@@ -53,7 +53,7 @@ impl GpuTileCache {
             image,
             sampler: height_pages::sampler(gpu, Sampling::Clamped)?,
             tile_bytes,
-            staging: (0..SLOTS).map(staging).collect::<Result<_>>()?,
+            staging: (0..gpu.frames_in_flight).map(staging).collect::<Result<_>>()?,
         };
         once(gpu, |r| {
             let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
@@ -162,7 +162,7 @@ impl Overlay {
             }
         };
         let table = |_| Buffer::host(gpu, "texture table", 4 * words as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, parts };
+        let mut overlay = Self { slots, tables: (0..gpu.frames_in_flight).map(table).collect::<Result<_>>()?, parts };
         // Everything by the root.
         if let Some(table) = overlay.parts.table() {
             overlay.tables.iter_mut().for_each(|buffer| buffer.write(0, bytemuck::cast_slice(table)));

@@ -1,4 +1,4 @@
-//! Executes draw lists on Vulkan: the only module that names `ash` or says `unsafe`.
+//! Executes draw lists on Vulkan. Besides [`embed`](crate::embed), it is the only module that names `ash` or says `unsafe`.
 //!
 //! It cannot tell which technique it draws. Offscreen pictures and windows are two targets with the same two
 //! steps. Everything is made at start; nothing is created inside a frame.
@@ -16,6 +16,7 @@ pub mod height_pages;
 #[cfg(feature = "viewer")]
 pub mod hud;
 pub mod instance;
+pub mod lent;
 mod live;
 mod loss;
 mod materials;
@@ -24,6 +25,7 @@ pub mod pipelines;
 pub mod position_check;
 pub mod probe;
 pub mod renderdoc;
+pub mod requirements;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;

@@ -153,7 +153,7 @@ impl Swapchain {
 
     /// Formats to draw with.
     pub fn formats(&self) -> Formats {
-        Formats { colour: self.format.format, depth: self.has_depth.then_some(DEPTH) }
+        Formats::own(self.format.format, self.has_depth.then_some(DEPTH))
     }
 
     /// Says whether frames from now on are drawn with depth. It waits for the device.

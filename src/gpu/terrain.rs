@@ -8,7 +8,7 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
-use super::frames::{Recording, SLOTS};
+use super::frames::Recording;
 use super::gpu_selection::GpuSelector;
 use super::gpu_tile_cache::Overlay;
 use super::height_pages::{self, Sampler, Sampling};
@@ -105,7 +105,7 @@ impl Terrain {
 
     fn make_slots(&mut self) -> Result<()> {
         let gpu = &self.gpu;
-        let layouts = [self.pipelines.set_layout; SLOTS];
+        let layouts = vec![self.pipelines.set_layout; gpu.frames_in_flight];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptors).set_layouts(&layouts);
         // SAFETY: the pool holds as many sets as there are slots, and they are free.
         let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
@@ -299,6 +299,9 @@ impl Terrain {
     }
 
     fn draw_sky(&self, recording: &mut Recording) -> Result<()> {
+        if self.pipelines.sky == vk::Pipeline::null() {
+            return Ok(());
+        }
         recording.scope("sky", |r| {
             // SAFETY: the pipeline outlives the frame; three vertices without input.
             unsafe {
@@ -396,7 +399,7 @@ impl Resident {
 }
 
 fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
-    let slots = SLOTS as u32;
+    let slots = gpu.frames_in_flight as u32;
     let sizes = [
         vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
         vk::DescriptorPoolSize {
@@ -416,7 +419,7 @@ impl Drop for Terrain {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
         }
     }
