@@ -13,6 +13,7 @@
 //! - [`gpu`]: executes frames on Vulkan (feature `vulkan`).
 //! - [`measure`]: numbers from triangles and pictures: errors, proofs.
 //! - [`scene`]: a field with a look on a device, drawn offscreen (feature `vulkan`).
+//! - [`embed`]: terrain inside another program's Vulkan renderer (feature `vulkan`).
 //! - [`mod@bench`]: error against run time, along named paths.
 //! - [`profile`]: where a frame's time goes, draw by draw (measured with feature `vulkan`).
 //! - [`stress`]: the invariants, and the suite of stiff and extreme cases.
@@ -41,6 +42,9 @@ pub mod measure;
 
 #[cfg(feature = "vulkan")]
 pub mod scene;
+
+#[cfg(feature = "vulkan")]
+pub mod embed;
 
 pub mod bench;
 

@@ -123,7 +123,7 @@ impl Drop for Bindings {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_pipeline_layout(self.layout, None);
             self.gpu.raw.destroy_descriptor_pool(self.pool, None);
             self.gpu.raw.destroy_descriptor_set_layout(self.set_layout, None);

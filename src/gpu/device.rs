@@ -10,11 +10,13 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::clock;
+use super::frames::SLOTS;
 use super::instance::{Instance, version_text};
 use super::loss::Presence;
+use super::requirements::Requirements;
 use crate::plan::DeviceLimits;
 
-/// Which device to take.
+/// Choice of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
     /// Discrete before integrated before virtual before software.
@@ -22,11 +24,11 @@ pub enum Choice {
     Best,
     /// A software device.
     Cpu,
-    /// The first whose name contains this, whatever the case.
+    /// The first device whose name contains this, in any case.
     Named(String),
 }
 
-/// A physical device as the program sees it.
+/// A physical device.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// The device.
@@ -39,20 +41,20 @@ pub struct Candidate {
     pub version: String,
     /// Its driver's name and version.
     pub driver: String,
-    /// What it lacks; empty if it can be used.
+    /// Missing features; empty if the device can be used.
     pub missing: Vec<String>,
     pub(super) queue_family: u32,
 }
 
-/// A logical device with one queue and an allocator. Objects made on it hold an `Arc` of it.
+/// A logical device with one queue and an allocator: its own, or lent by a caller. Its objects hold an `Arc` of it.
 pub struct Gpu {
-    /// The instance it was made from.
+    /// The instance of the device.
     pub instance: Arc<Instance>,
-    /// The device it was made on.
+    /// The physical device.
     pub candidate: Candidate,
     /// The device.
     pub raw: ash::Device,
-    /// The one queue: graphics, compute and transfer.
+    /// The only queue: graphics, compute and transfer. A caller's queue is used only while resources are created.
     pub queue: vk::Queue,
     /// The queue's family.
     pub queue_family: u32,
@@ -60,29 +62,70 @@ pub struct Gpu {
     pub limits: vk::PhysicalDeviceLimits,
     /// Nanoseconds per tick of a timestamp; 0 if there are none.
     pub timestamp_ns: f64,
-    /// Whether pipeline statistics can be queried.
+    /// True if pipeline statistics can be queried.
     pub has_statistics: bool,
-    /// Whether fragments that pass the depth test can be counted.
+    /// True if fragments that pass the depth test can be counted.
     pub counts_passed: bool,
-    /// Whether vertex programs may write to buffers: what capturing the as-drawn mesh needs.
+    /// True if vertex shaders may write to buffers, which capturing the drawn mesh needs.
     pub captures: bool,
-    /// Whether the number of draws may come from a buffer (`drawIndirectCount`): what selection on the device needs.
+    /// True if the number of draws may come from a buffer (`drawIndirectCount`), which GPU selection needs.
     pub counts_draws: bool,
+    /// Frames whose commands may be under way at once.
+    pub frames_in_flight: usize,
     /// Allocator of all memory.
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
+    /// True if instance, device and queue belong to a caller.
+    is_lent: bool,
     utils: Option<ext::debug_utils::Device>,
-    /// Reads the clock of timestamps, where the driver can.
+    /// Reads the clock of timestamps, where the driver supports it.
     pub(super) clock: Option<ext::calibrated_timestamps::Device>,
     /// Valid bits of a timestamp.
     pub(super) timestamp_bits: u32,
     /// Device bytes in use by purpose.
     pub(super) bytes: Mutex<std::collections::BTreeMap<&'static str, u64>>,
-    /// Allocations that are still to succeed.
+    /// Number of allocations that succeed before one fails.
     allocations_left: AtomicU64,
     pub(super) presence: Presence,
 }
 
-/// All devices of an instance, the usable ones first, the best first among them.
+/// Device and queue, with the allocator of the device's memory.
+pub(super) struct Handles {
+    pub raw: ash::Device,
+    pub queue: vk::Queue,
+    pub allocator: Arc<Mutex<Allocator>>,
+    /// True if the handles belong to a caller, who destroys them.
+    pub is_lent: bool,
+}
+
+/// Device features that are used where they are enabled.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Optional {
+    pub statistics: bool,
+    pub counts_passed: bool,
+    pub captures: bool,
+    pub counts_draws: bool,
+    pub clock: bool,
+    pub timestamps: bool,
+}
+
+/// Creates an allocator of device memory.
+pub(super) fn allocator(
+    instance: &ash::Instance,
+    device: &ash::Device,
+    physical_device: vk::PhysicalDevice,
+) -> Result<Arc<Mutex<Allocator>>> {
+    let allocator = Allocator::new(&AllocatorCreateDesc {
+        instance: instance.clone(),
+        device: device.clone(),
+        physical_device,
+        debug_settings: Default::default(),
+        buffer_device_address: false,
+        allocation_sizes: Default::default(),
+    });
+    Ok(Arc::new(Mutex::new(allocator.context("no allocator")?)))
+}
+
+/// Returns all devices of an instance, the usable ones first, the best first among them.
 pub fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.raw.enumerate_physical_devices() }.context("no list of Vulkan devices")?;
@@ -97,7 +140,7 @@ pub fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     Ok(candidates)
 }
 
-fn candidate(instance: &Instance, raw: vk::PhysicalDevice) -> Candidate {
+pub(super) fn candidate(instance: &Instance, raw: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
     // SAFETY: `raw` comes from this instance.
@@ -107,12 +150,7 @@ fn candidate(instance: &Instance, raw: vk::PhysicalDevice) -> Candidate {
     let families = unsafe { instance.raw.get_physical_device_queue_family_properties(raw) };
     let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     let queue_family = families.iter().position(|f| f.queue_flags.contains(wanted));
-    let mut missing = Vec::new();
-    if properties.api_version < vk::API_VERSION_1_3 {
-        missing.push(format!("Vulkan 1.3 (it has {})", version_text(properties.api_version)));
-    } else {
-        missing.extend(missing_features(instance, raw));
-    }
+    let mut missing = Requirements::OWN.missing(&instance.raw, raw, properties.api_version);
     if queue_family.is_none() {
         missing.push("a queue for graphics and compute".to_string());
     }
@@ -129,30 +167,6 @@ fn candidate(instance: &Instance, raw: vk::PhysicalDevice) -> Candidate {
     }
 }
 
-fn missing_features(instance: &Instance, raw: vk::PhysicalDevice) -> Vec<String> {
-    let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
-    // SAFETY: the chain holds structs that a 1.3 device knows.
-    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
-    let core = features.features;
-    [
-        (core.multi_draw_indirect, "multiDrawIndirect"),
-        (core.draw_indirect_first_instance, "drawIndirectFirstInstance"),
-        (core.fill_mode_non_solid, "fillModeNonSolid"),
-        (v12.scalar_block_layout, "scalarBlockLayout"),
-        (v12.host_query_reset, "hostQueryReset"),
-        (v13.dynamic_rendering, "dynamicRendering"),
-        (v13.maintenance4, "maintenance4"),
-        (v13.synchronization2, "synchronization2"),
-        (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
-    ]
-    .into_iter()
-    .filter(|(has, _)| *has == vk::FALSE)
-    .map(|(_, name)| name.to_string())
-    .collect()
-}
-
 fn counts_draws(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12);
@@ -162,7 +176,7 @@ fn counts_draws(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
 }
 
 impl Candidate {
-    /// Whether it computes on the CPU.
+    /// Returns true if the device computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.kind == vk::PhysicalDeviceType::CPU
     }
@@ -177,12 +191,12 @@ impl Candidate {
 }
 
 impl Gpu {
-    /// Makes a device; `window` adds the swapchain extension.
+    /// Creates a device; `window` adds the swapchain extension.
     pub fn new(instance: &Arc<Instance>, choice: &Choice, window: bool) -> Result<Arc<Self>> {
         Self::on(instance, choose(instance, choice, |_| true)?, window)
     }
 
-    /// Makes a device that can show pictures on a window, as `is_shown_by` says.
+    /// Creates a device that can present to a window, as `is_shown_by` tells.
     pub fn for_window(
         instance: &Arc<Instance>,
         choice: &Choice,
@@ -198,26 +212,22 @@ impl Gpu {
             .queue_priorities(&priorities)];
         // SAFETY: `raw` comes from this instance.
         let available = unsafe { instance.raw.get_physical_device_features(candidate.raw) };
-        let core = vk::PhysicalDeviceFeatures::default()
-            .multi_draw_indirect(true)
-            .draw_indirect_first_instance(true)
-            .fill_mode_non_solid(true)
-            .occlusion_query_precise(available.occlusion_query_precise == vk::TRUE)
-            .pipeline_statistics_query(available.pipeline_statistics_query == vk::TRUE)
-            .vertex_pipeline_stores_and_atomics(available.vertex_pipeline_stores_and_atomics == vk::TRUE);
-        let counts_draws = counts_draws(instance, candidate.raw);
-        let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
-            .scalar_block_layout(true)
-            .host_query_reset(true)
-            .draw_indirect_count(counts_draws);
-        let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
-            .dynamic_rendering(true)
-            // Compilers state the size of workgroups by LocalSizeId, which needs it.
-            .maintenance4(true)
-            .synchronization2(true)
-            .shader_demote_to_helper_invocation(true);
-        let has_clock = clock::is_readable(instance, candidate.raw);
-        let wanted = [(window, khr::swapchain::NAME), (has_clock, ext::calibrated_timestamps::NAME)];
+        let optional = Optional {
+            statistics: available.pipeline_statistics_query == vk::TRUE,
+            counts_passed: available.occlusion_query_precise == vk::TRUE,
+            captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
+            counts_draws: counts_draws(instance, candidate.raw),
+            clock: clock::is_readable(instance, candidate.raw),
+            timestamps: true,
+        };
+        let mut core = vk::PhysicalDeviceFeatures::default()
+            .occlusion_query_precise(optional.counts_passed)
+            .pipeline_statistics_query(optional.statistics)
+            .vertex_pipeline_stores_and_atomics(optional.captures);
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default().draw_indirect_count(optional.counts_draws);
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        Requirements::OWN.enable(&mut core, &mut v12, &mut v13);
+        let wanted = [(window, khr::swapchain::NAME), (optional.clock, ext::calibrated_timestamps::NAME)];
         let extensions: Vec<_> = wanted.into_iter().filter(|(is, _)| *is).map(|(_, name)| name.as_ptr()).collect();
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -230,44 +240,54 @@ impl Gpu {
             .with_context(|| format!("no logical device on {}", candidate.name))?;
         // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
-        let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.raw.clone(),
-            device: raw.clone(),
-            physical_device: candidate.raw,
-            debug_settings: Default::default(),
-            buffer_device_address: false,
-            allocation_sizes: Default::default(),
-        })
-        .context("no allocator")?;
+        let allocator = allocator(&instance.raw, &raw, candidate.raw)?;
+        let handles = Handles { raw, queue, allocator, is_lent: false };
+        let gpu = Self::assemble(Arc::clone(instance), candidate, handles, optional, SLOTS);
+        gpu.name(queue, "queue");
+        Ok(gpu)
+    }
+
+    /// Puts a device together from its handles. `candidate` holds the family of the queue.
+    pub(super) fn assemble(
+        instance: Arc<Instance>,
+        candidate: Candidate,
+        handles: Handles,
+        optional: Optional,
+        frames_in_flight: usize,
+    ) -> Arc<Self> {
+        let Handles { raw, queue, allocator, is_lent } = handles;
         // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let limits = unsafe { instance.raw.get_physical_device_properties(candidate.raw) }.limits;
         // SAFETY: the handles come from this instance and device, and what is pointed to lives until the call returns.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(candidate.raw) };
-        let timestamp_bits = families[candidate.queue_family as usize].timestamp_valid_bits;
-        let clock = has_clock.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &raw));
+        let timestamp_bits = match optional.timestamps {
+            true => families[candidate.queue_family as usize].timestamp_valid_bits,
+            false => 0,
+        };
+        let clock = optional.clock.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &raw));
         let utils = instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
-        let gpu = Arc::new(Self {
-            instance: Arc::clone(instance),
+        Arc::new(Self {
+            instance,
             queue_family: candidate.queue_family,
             candidate,
             raw,
             queue,
             limits,
             timestamp_ns: if timestamp_bits > 0 { f64::from(limits.timestamp_period) } else { 0.0 },
-            has_statistics: available.pipeline_statistics_query == vk::TRUE,
-            counts_passed: available.occlusion_query_precise == vk::TRUE,
-            counts_draws,
-            captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
-            allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
+            has_statistics: optional.statistics,
+            counts_passed: optional.counts_passed,
+            counts_draws: optional.counts_draws,
+            captures: optional.captures,
+            frames_in_flight,
+            allocator: ManuallyDrop::new(allocator),
+            is_lent,
             utils,
             clock,
             timestamp_bits,
             bytes: Mutex::default(),
             allocations_left: AtomicU64::new(u64::MAX),
             presence: Presence::default(),
-        });
-        gpu.name(queue, "queue");
-        Ok(gpu)
+        })
     }
 
     /// Gives a Vulkan object a name that tools show.
@@ -279,7 +299,7 @@ impl Gpu {
         let _ = unsafe { utils.set_debug_utils_object_name(&info) };
     }
 
-    /// Opens a label in a command buffer.
+    /// Begins a debug label in a command buffer.
     pub fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
         let Some(utils) = &self.utils else { return };
         let text = CString::new(name).unwrap_or_default();
@@ -287,7 +307,7 @@ impl Gpu {
         unsafe { utils.cmd_begin_debug_utils_label(commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
     }
 
-    /// Closes the label opened last.
+    /// Ends the label that was begun last.
     pub fn end_label(&self, commands: vk::CommandBuffer) {
         if let Some(utils) = &self.utils {
             // SAFETY: the command buffer is being recorded and a label is open.
@@ -295,7 +315,7 @@ impl Gpu {
         }
     }
 
-    /// What the device allows, as far as plans depend on it.
+    /// Returns the device limits that scene plans depend on.
     pub fn device_limits(&self) -> DeviceLimits {
         let filters = |format| {
             // SAFETY: the physical device is of this instance.
@@ -310,23 +330,23 @@ impl Gpu {
         }
     }
 
-    /// From now on so many allocations of device memory succeed, and those after them fail: to try what happens then.
+    /// Makes all allocations of device memory after the next `count` fail, for tests.
     pub fn limit_allocations(&self, count: u64) {
         self.allocations_left.store(count, Relaxed);
     }
 
-    /// Counts an allocation: whether it may succeed.
+    /// Counts an allocation. Returns true if it may succeed.
     pub(super) fn may_allocate(&self) -> bool {
         self.allocations_left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok()
     }
 
-    /// Device bytes in use, by purpose.
+    /// Returns the device bytes in use, by purpose.
     pub fn device_bytes(&self) -> std::collections::BTreeMap<&'static str, u64> {
         self.bytes.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// Gives the device up, of which nothing is in use any more: what the validation layers have said, the device's
-    /// end included.
+    /// Destroys the device, whose objects must all be gone. Returns the messages of the validation layers, those about the
+    /// destruction included.
     pub fn close(gpu: Arc<Self>) -> Vec<String> {
         let instance = Arc::clone(&gpu.instance);
         drop(gpu);
@@ -334,8 +354,11 @@ impl Gpu {
         messages.clone()
     }
 
-    /// Waits until the device has nothing to do.
+    /// Waits until the device is idle. A lent device is its owner's to wait for: then this returns at once.
     pub fn wait_idle(&self) -> Result<()> {
+        if self.is_lent {
+            return Ok(());
+        }
         // SAFETY: one thread uses the queue.
         unsafe { self.raw.device_wait_idle() }.context("waiting for the device")
     }
@@ -369,9 +392,11 @@ impl Drop for Gpu {
     fn drop(&mut self) {
         // SAFETY: every object holds an Arc of this device, so none is left; the allocator goes before it.
         unsafe {
-            let _ = self.raw.device_wait_idle();
+            let _ = self.wait_idle();
             ManuallyDrop::drop(&mut self.allocator);
-            self.raw.destroy_device(None);
+            if !self.is_lent {
+                self.raw.destroy_device(None);
+            }
         }
     }
 }

@@ -173,7 +173,7 @@ pub struct Semaphores {
 
 impl<'a> Recording<'a> {
     /// Wraps a command buffer that another renderer began. Passes in it are labelled but not timed. `slot` is below
-    /// [`SLOTS`], and the commands recorded before under the same slot have finished.
+    /// [`Gpu::frames_in_flight`], and the commands recorded before under the same slot have finished.
     pub fn of_caller(gpu: &'a Arc<Gpu>, commands: vk::CommandBuffer, slot: usize) -> Self {
         Self { gpu, commands, slot, queries: None }
     }
@@ -324,7 +324,7 @@ impl Drop for Frames {
     fn drop(&mut self) {
         // SAFETY: the device is idle before anything goes.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             for slot in &self.slots {
                 self.gpu.raw.destroy_query_pool(slot.stamps, None);
                 self.gpu.raw.destroy_query_pool(slot.statistics, None);

@@ -8,7 +8,7 @@ use gpu_allocator::MemoryLocation;
 
 use super::bindings::{Bindings, Bound};
 use super::device::Gpu;
-use super::frames::{Recording, SLOTS, once};
+use super::frames::{Recording, once};
 use super::memory::{Buffer, filled, memory_barrier};
 use super::pipelines;
 use super::shaders::Constants;
@@ -65,7 +65,7 @@ impl GpuSelector {
         let (gpu, steps, draws) = (Arc::clone(gpu), gpu_selection.steps.clone(), gpu_selection.draws);
         let (slots, pipelines) = (Vec::new(), Vec::new());
         let mut gpu_selector = Self { gpu, pool, slots, pipelines, scratch, table, steps, draws, newest: 0 };
-        for _ in 0..SLOTS {
+        for _ in 0..gpu_selector.gpu.frames_in_flight {
             gpu_selector.slots.push(Slot::new(
                 &gpu_selector.gpu,
                 pool,
@@ -274,7 +274,7 @@ impl Drop for GpuSelector {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_command_pool(self.pool, None);
             for pipeline in &self.pipelines {
                 self.gpu.raw.destroy_pipeline(*pipeline, None);

@@ -10,7 +10,7 @@ use anyhow::{Result, bail};
 use ash::vk;
 
 use super::device::Gpu;
-use super::frames::{Recording, SLOTS, once};
+use super::frames::{Recording, once};
 use super::height_pages::{self, Sampler, Sampling};
 use super::memory::{Buffer, Image, ImageInfo, barriers};
 use crate::draw::{DrawList, Geometry};
@@ -54,7 +54,7 @@ impl GpuTileCache {
             image,
             sampler: height_pages::sampler(gpu, Sampling::Clamped)?,
             tile_bytes,
-            staging: (0..SLOTS).map(staging).collect::<Result<_>>()?,
+            staging: (0..gpu.frames_in_flight).map(staging).collect::<Result<_>>()?,
         };
         once(gpu, |r| {
             let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
@@ -164,7 +164,7 @@ impl Overlay {
             }
         };
         let table = |_| Buffer::host(gpu, "texture table", 4 * words as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        let mut overlay = Self { slots, tables: (0..SLOTS).map(table).collect::<Result<_>>()?, texture };
+        let mut overlay = Self { slots, tables: (0..gpu.frames_in_flight).map(table).collect::<Result<_>>()?, texture };
         // All pages start with the root tile.
         if let Some(table) = overlay.texture.table() {
             overlay.tables.iter_mut().for_each(|buffer| buffer.write(0, bytemuck::cast_slice(table)));

@@ -16,24 +16,24 @@ pub struct Instance {
     /// The instance.
     pub raw: ash::Instance,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    /// Whether objects can be named and labelled.
+    /// True if objects can be named and labelled.
     pub has_debug_utils: bool,
-    /// What the layers have said.
+    /// Messages of the validation layers.
     pub messages: Messages,
+    /// True if the instance belongs to a caller, who destroys it.
+    is_lent: bool,
     // The messenger's user data points here.
     _sink: Box<Messages>,
 }
 
-/// Messages that are expected, as parts of their text, and why.
-///
-/// None at present.
+/// Parts of the text of expected messages, each with the reason. None at present.
 const EXPECTED: &[&str] = &[];
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 impl Instance {
-    /// Makes an instance with the given extensions beside our own; with `validate`, core and synchronization
-    /// validation are on.
+    /// Creates an instance with the given extensions in addition to those of the renderer. `validate` turns on core and
+    /// synchronization validation.
     pub fn new(extensions: &[&CStr], validate: bool) -> Result<Arc<Self>> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, which is what it is for.
         let entry = unsafe { ash::Entry::load() }.context("no Vulkan loader (libvulkan.so.1) on this system")?;
@@ -74,7 +74,7 @@ impl Instance {
             .enabled_layer_names(&layers)
             .enabled_extension_names(&names);
         if validate {
-            // Watches the making of the instance itself, too.
+            // Messages about the creation of the instance itself.
             info = info.push_next(&mut features).push_next(&mut watch);
         }
         // SAFETY: all pointers live until the call returns; `sink` lives as long as the instance.
@@ -87,7 +87,14 @@ impl Instance {
         } else {
             None
         };
-        Ok(Arc::new(Self { entry, raw, messenger, has_debug_utils, messages, _sink: sink }))
+        Ok(Arc::new(Self { entry, raw, messenger, has_debug_utils, messages, is_lent: false, _sink: sink }))
+    }
+
+    /// Wraps an instance of a caller. `has_debug_utils`: it was created with `VK_EXT_debug_utils`.
+    pub(super) fn lent(entry: ash::Entry, raw: ash::Instance, has_debug_utils: bool) -> Arc<Self> {
+        let sink: Box<Messages> = Box::default();
+        let messages = Arc::clone(&sink);
+        Arc::new(Self { entry, raw, messenger: None, has_debug_utils, messages, is_lent: true, _sink: sink })
     }
 }
 
@@ -98,7 +105,9 @@ impl Drop for Instance {
             if let Some((utils, messenger)) = self.messenger.take() {
                 utils.destroy_debug_utils_messenger(messenger, None);
             }
-            self.raw.destroy_instance(None);
+            if !self.is_lent {
+                self.raw.destroy_instance(None);
+            }
         }
     }
 }
@@ -130,7 +139,7 @@ unsafe extern "system" fn receive(
     vk::FALSE
 }
 
-/// A version as major.minor.patch.
+/// Returns a version as major.minor.patch.
 pub fn version_text(version: u32) -> String {
     format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version))
 }

@@ -1,5 +1,5 @@
-//! The loss of the device: a driver that resets it or gives up says so at a submission or at a wait, and nothing can be
-//! done on it any more but to end. What happens then can be tried: so many calls succeed, and the next one is told so.
+//! Loss of the device. A driver that resets it or gives up reports the loss at a submission or a wait, and every later call
+//! fails. Tests simulate a loss after a number of calls.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
@@ -9,9 +9,9 @@ use ash::vk;
 
 use super::device::Gpu;
 
-/// Whether the device is there.
+/// State of a device that may be lost.
 pub(super) struct Presence {
-    /// Calls that are still to succeed.
+    /// Number of calls that succeed before a simulated loss.
     calls_left: AtomicU64,
     is_lost: AtomicBool,
 }
@@ -23,23 +23,23 @@ impl Default for Presence {
 }
 
 impl Gpu {
-    /// From now on so many submissions and waits succeed, and then the device counts as lost: to try what happens.
+    /// Simulates a loss of the device after the next `calls` submissions and waits.
     pub fn lose_after(&self, calls: u64) {
         self.presence.calls_left.store(calls, Relaxed);
         self.presence.is_lost.store(false, Relaxed);
     }
 
-    /// Whether it is lost.
+    /// Returns true if the device is lost.
     pub fn is_lost(&self) -> bool {
         self.presence.is_lost.load(Relaxed)
     }
 
-    /// What is to be said when it is lost.
+    /// Returns the message of a lost device.
     pub fn loss(&self) -> String {
         format!("{}: the device is lost: its driver has reset it or given up", self.candidate.name)
     }
 
-    /// Makes a call that is told when the device is lost; on a lost one none is made.
+    /// Runs `call` unless the device is lost, and records a loss.
     pub(super) fn check_device_lost<T>(&self, call: impl FnOnce() -> VkResult<T>) -> Result<T> {
         let left = &self.presence.calls_left;
         let is_spent = left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_err();
@@ -47,7 +47,7 @@ impl Gpu {
         answer.map_err(|error| self.failure(error))
     }
 
-    /// A call's failure in words.
+    /// Turns the error of a Vulkan call into a message, and records a loss.
     pub(super) fn failure(&self, error: vk::Result) -> anyhow::Error {
         if error != vk::Result::ERROR_DEVICE_LOST {
             return error.into();

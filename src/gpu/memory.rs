@@ -32,14 +32,14 @@ pub struct Image {
     memory: Memory,
 }
 
-/// What an image is to be.
+/// Description of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageInfo {
-    /// Names the purpose, in tools and in the account of bytes.
+    /// Name of the image, in tools and in the account of bytes.
     pub purpose: &'static str,
     /// Texels (x, y).
     pub size: [u32; 2],
-    /// Layers; an image with layers is viewed as an array.
+    /// Number of layers; an image with layers is viewed as an array.
     pub layers: Option<u32>,
     /// Format.
     pub format: vk::Format,
@@ -94,7 +94,7 @@ impl Drop for Memory {
 }
 
 impl Buffer {
-    /// A buffer of at least one byte. `location` says who writes or reads it.
+    /// Creates a buffer of at least 16 bytes. `location` tells whether the host writes or reads it.
     pub fn new(
         gpu: &Arc<Gpu>,
         purpose: &'static str,
@@ -122,12 +122,12 @@ impl Buffer {
         }
     }
 
-    /// A device-local buffer that commands fill.
+    /// Creates a device-local buffer that commands fill.
     pub fn device(gpu: &Arc<Gpu>, purpose: &'static str, size: u64, usage: vk::BufferUsageFlags) -> Result<Self> {
         Self::new(gpu, purpose, size, usage | vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuOnly)
     }
 
-    /// A buffer that the host writes and the device reads.
+    /// Creates a buffer that the host writes and the device reads.
     pub fn host(gpu: &Arc<Gpu>, purpose: &'static str, size: u64, usage: vk::BufferUsageFlags) -> Result<Self> {
         Self::new(gpu, purpose, size, usage, MemoryLocation::CpuToGpu)
     }
@@ -141,7 +141,7 @@ impl Buffer {
         mapped[offset..offset + data.len()].copy_from_slice(data);
     }
 
-    /// Copies indices that fit 16 bits into a host-visible buffer, 16 bits each.
+    /// Writes indices to a host-visible buffer with 16 bits each.
     ///
     /// # Panics
     /// If the buffer is not host-visible or they do not fit.
@@ -151,7 +151,7 @@ impl Buffer {
         short.iter_mut().zip(indices).for_each(|(short, index)| *short = *index as u16);
     }
 
-    /// Sets every byte of a host-visible buffer.
+    /// Sets every byte of a host-visible buffer to `byte`.
     ///
     /// # Panics
     /// If the buffer is not host-visible.
@@ -161,7 +161,7 @@ impl Buffer {
         mapped[..size].fill(byte);
     }
 
-    /// The bytes of a host-visible buffer.
+    /// Returns the bytes of a host-visible buffer.
     ///
     /// # Panics
     /// If the buffer is not host-visible.
@@ -179,12 +179,12 @@ impl Drop for Buffer {
 }
 
 impl Image {
-    /// A device-local image and its view.
+    /// Creates a device-local image with one mipmap level, and its view.
     pub fn new(gpu: &Arc<Gpu>, info: ImageInfo) -> Result<Self> {
         Self::with_levels(gpu, info, 1)
     }
 
-    /// The same with so many mipmap levels.
+    /// Creates a device-local image with this number of mipmap levels, and a view of all of them.
     pub fn with_levels(gpu: &Arc<Gpu>, info: ImageInfo, levels: u32) -> Result<Self> {
         let limit = gpu.limits.max_image_dimension2_d;
         if info.size.iter().any(|&n| n > limit) {
@@ -226,7 +226,7 @@ impl Image {
         }
     }
 
-    /// A barrier over the whole image.
+    /// Returns a barrier for the whole image.
     pub fn barrier(
         &self,
         from: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
@@ -246,7 +246,7 @@ impl Drop for Image {
     }
 }
 
-/// A device-local buffer with this content.
+/// Creates a device-local buffer with this content. Submits a copy and waits for it.
 pub(super) fn filled(
     gpu: &Arc<Gpu>,
     purpose: &'static str,
@@ -271,7 +271,7 @@ pub(super) fn filled(
     Ok(buffer)
 }
 
-/// A barrier over all of an image: stage, access and layout before and after.
+/// Returns a barrier for a whole image: stage, access and layout before and after.
 pub fn image_barrier(
     image: vk::Image,
     format: vk::Format,
@@ -298,7 +298,7 @@ pub fn barriers(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &[vk::ImageMem
     unsafe { gpu.raw.cmd_pipeline_barrier2(commands, &info) };
 }
 
-/// Records a barrier over all memory.
+/// Records a barrier for all memory.
 pub fn memory_barrier(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
@@ -314,7 +314,7 @@ pub fn memory_barrier(
     unsafe { gpu.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
 }
 
-/// What images of a format hold.
+/// Returns the aspect of images of a format.
 pub fn aspect(format: vk::Format) -> vk::ImageAspectFlags {
     if format == vk::Format::D32_SFLOAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR }
 }

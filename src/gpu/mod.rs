@@ -1,4 +1,4 @@
-//! Executes draw lists on Vulkan: the only module that uses `ash` and `unsafe`.
+//! Executes draw lists on Vulkan. Besides [`embed`](crate::embed), it is the only module that names `ash` or says `unsafe`.
 //!
 //! It does not depend on any technique. One [`frame_renderer`] draws every frame as a list of [`passes`] to a
 //! [`target`]. All objects are made in advance; nothing is created inside a frame.
@@ -13,6 +13,7 @@ pub mod gpu_selection;
 pub mod gpu_tile_cache;
 pub mod height_pages;
 pub mod instance;
+pub mod lent;
 mod live;
 mod loss;
 mod materials;
@@ -23,6 +24,7 @@ pub mod pipelines;
 pub mod position_check;
 pub mod probe;
 pub mod renderdoc;
+pub mod requirements;
 #[cfg(feature = "viewer")]
 pub mod screenshot;
 pub mod shaders;

@@ -71,7 +71,7 @@ impl PassList {
             let drawn = if is_post { between.after(done) } else { None };
             done += usize::from(is_post);
             let colour = between.after(done).map_or(formats.colour, |image| image.format);
-            let formats = Formats { colour, depth: formats.depth.filter(|_| done == 0) };
+            let formats = Formats { colour, depth: formats.depth.filter(|_| done == 0), ..formats };
             passes.push(make(&MakeInput { gpu, plan, scene: scene.set_layout(), formats, drawn })?);
         }
         Ok(Self { passes, between, formats })

@@ -23,7 +23,7 @@ pub struct Pipelines {
     pub set_layout: vk::DescriptorSetLayout,
     /// Layout of all pipelines.
     pub layout: vk::PipelineLayout,
-    /// The sky.
+    /// Sky behind the terrain; null if the formats have none.
     pub sky: vk::Pipeline,
     /// True if pictures have a depth buffer.
     pub has_depth: bool,
@@ -58,7 +58,9 @@ impl Pipelines {
         gpu.name(layout, "scene");
         let (sky, has_depth) = (vk::Pipeline::null(), formats.depth.is_some());
         let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, has_depth, terrain: BTreeMap::new() };
-        pipelines.sky = pipelines.make_sky(formats)?;
+        if formats.has_sky {
+            pipelines.sky = pipelines.make_sky(formats)?;
+        }
         for (source, topology) in draws(plan) {
             let pipeline = terrain(gpu, layout, plan, Pass::Picture(formats), source, topology)?;
             pipelines.terrain.insert((source, topology), pipeline);
@@ -171,8 +173,8 @@ pub(super) fn terrain(
         }
         Pass::Capture => (capture, None, None),
     };
-    // Reversed depth: the far plane lies at depth 0.
-    let depth = formats.and_then(|formats| formats.depth).map(|_| (true, vk::CompareOp::GREATER));
+    let nearer = |formats: Formats| if formats.is_reversed { vk::CompareOp::GREATER } else { vk::CompareOp::LESS };
+    let depth = formats.filter(|formats| formats.depth.is_some()).map(|formats| (true, nearer(formats)));
     let description = Description {
         name,
         vertex,
@@ -219,7 +221,8 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
         .line_width(1.0)
         // Capturing needs only the writes of the vertex shader.
         .rasterizer_discard_enable(fragment.is_none());
-    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default()
+        .rasterization_samples(d.formats.map_or(vk::SampleCountFlags::TYPE_1, |formats| formats.samples));
     let depth = vk::PipelineDepthStencilStateCreateInfo::default()
         .depth_test_enable(d.depth.is_some())
         .depth_write_enable(d.depth.is_some_and(|(writes, _)| writes))
@@ -233,7 +236,10 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
     let depth_format = d.formats.and_then(|formats| formats.depth).unwrap_or(vk::Format::UNDEFINED);
     let mut rendering = vk::PipelineRenderingCreateInfo::default()
         .color_attachment_formats(&colours)
-        .depth_attachment_format(depth_format);
+        .depth_attachment_format(depth_format)
+        .stencil_attachment_format(d.formats.map_or(vk::Format::UNDEFINED, |formats| formats.stencil));
+    let render_pass = d.formats.and_then(|formats| formats.render_pass);
+    let (pass, subpass) = render_pass.unwrap_or((vk::RenderPass::null(), 0));
     let info = vk::GraphicsPipelineCreateInfo::default()
         .stages(&stages)
         .vertex_input_state(&d.input)
@@ -245,8 +251,10 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
         .color_blend_state(&blend)
         .dynamic_state(&dynamic)
         .layout(layout)
-        .push_next(&mut rendering);
-    // SAFETY: everything that the info points to is alive; modules may be destroyed once the pipeline exists.
+        .render_pass(pass)
+        .subpass(subpass);
+    let info = if render_pass.is_none() { info.push_next(&mut rendering) } else { info };
+    // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
     let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
     // SAFETY: nothing uses the modules any more.
     unsafe {

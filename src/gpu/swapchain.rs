@@ -165,7 +165,7 @@ impl Swapchain {
 
     /// Formats of the attachments.
     pub fn formats(&self) -> Formats {
-        Formats { colour: self.format.format, depth: self.has_depth.then_some(DEPTH) }
+        Formats::own(self.format.format, self.has_depth.then_some(DEPTH))
     }
 
     /// Adds or removes depth for later frames. Waits for the device.

@@ -8,7 +8,7 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
-use super::frames::{Recording, SLOTS};
+use super::frames::Recording;
 use super::gpu_selection::GpuSelector;
 use super::gpu_tile_cache::Overlay;
 use super::height_pages::{self, Sampler, Sampling};
@@ -108,7 +108,7 @@ impl Terrain {
 
     fn make_slots(&mut self) -> Result<()> {
         let gpu = &self.gpu;
-        let layouts = [self.pipelines.set_layout; SLOTS];
+        let layouts = vec![self.pipelines.set_layout; gpu.frames_in_flight];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptors).set_layouts(&layouts);
         // SAFETY: the pool holds as many sets as there are slots, and they are free.
         let sets = unsafe { gpu.raw.allocate_descriptor_sets(&info) }?;
@@ -250,6 +250,9 @@ impl Terrain {
     /// None at present.
     pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
         let sky = |recording: &mut Recording| {
+            if self.pipelines.sky == vk::Pipeline::null() {
+                return Ok(());
+            }
             recording.scope("sky", |r| {
                 self.draw_sky(r);
                 Ok(())
@@ -400,7 +403,7 @@ impl Resident {
 }
 
 fn descriptor_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
-    let slots = SLOTS as u32;
+    let slots = gpu.frames_in_flight as u32;
     let sizes = [
         vk::DescriptorPoolSize { ty: vk::DescriptorType::UNIFORM_BUFFER, descriptor_count: slots },
         vk::DescriptorPoolSize {
@@ -420,7 +423,7 @@ impl Drop for Terrain {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_descriptor_pool(self.descriptors, None);
         }
     }

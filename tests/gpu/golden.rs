@@ -35,12 +35,17 @@ fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file
         .unwrap();
     let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look, overlay: None };
     let drawn = scene.render(technique.as_mut(), &view, 1).unwrap().picture;
+    check(&drawn, file);
+}
+
+/// Compares a picture with a golden one; panics if too many pixels differ.
+pub(super) fn check(drawn: &image::RgbaImage, file: &str) {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{file}.png"));
     if std::env::var("UPDATE_GOLDEN").as_deref() == Ok("1") {
         drawn.save(&path).unwrap();
     }
     let golden = image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).into_rgba8();
-    let (largest, share) = difference(&drawn, &golden, THRESHOLD);
+    let (largest, share) = difference(drawn, &golden, THRESHOLD);
     if share > SHARE {
         let folder = std::env::temp_dir();
         let actual = folder.join(format!("cuesta-{file}-actual.png"));

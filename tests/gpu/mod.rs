@@ -6,6 +6,7 @@ mod capture;
 mod cave;
 mod detail;
 mod draw_list;
+mod embed;
 mod endless;
 mod golden;
 mod gpu_selection;

@@ -200,7 +200,7 @@ impl Drop for Capture {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             for pipeline in self.pipelines.values() {
                 self.gpu.raw.destroy_pipeline(*pipeline, None);
             }

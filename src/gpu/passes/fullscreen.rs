@@ -71,7 +71,7 @@ impl Drop for Fullscreen {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_pipeline(self.pipeline, None);
         }
     }

@@ -122,7 +122,7 @@ impl Drop for Hud {
     fn drop(&mut self) {
         // SAFETY: nothing is in use once the device is idle; the renderer goes after this.
         unsafe {
-            let _ = self.gpu.raw.device_wait_idle();
+            let _ = self.gpu.wait_idle();
             self.gpu.raw.destroy_command_pool(self.pool, None);
         }
     }
