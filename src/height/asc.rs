@@ -3,9 +3,9 @@
 use super::{
     Error, Samples,
     affine::Affine,
+    decoded::Decoded,
     georef::Grid,
     load::{Options, Source},
-    raster::Raster,
     text::{self, Words},
 };
 
@@ -31,7 +31,7 @@ pub(super) fn is_header(head: &[u8]) -> bool {
 }
 
 /// Reads a grid.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let mut words = Words::new();
     let header = Header::read(source, &mut words)?;
     let size = header.size(source)?;
@@ -40,7 +40,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     source.need("heights", (count as u64).saturating_mul(2) - 1)?;
     let heights = read_heights(source, &mut words, count)?;
     let size = size.map(|n| n as u32);
-    let mut raster = Raster::new("ESRI ASCII grid", "text", size, Samples::F32(heights));
+    let mut raster = Decoded::new("ESRI ASCII grid", "text", size, Samples::F32(heights));
     raster.nodata = header.value(&["nodata_value", "nodata"]);
     raster.georeference.affine = Some(Affine::north_up(header.grid(source, size)?));
     Ok(raster)

@@ -8,11 +8,12 @@ use std::{
 use super::{
     Error,
     affine::Affine,
-    asc, envi,
+    asc,
+    decoded::Decoded,
+    envi,
     georef::Grid,
     load::{Options, Source},
     nodata,
-    raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
     sidecar::Georeference,
@@ -56,7 +57,7 @@ pub(super) struct Header {
 }
 
 /// Reads the samples by the header beside them.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let text =
         source.sibling_text("hdr").ok_or_else(|| source.error("header", "expected a .hdr beside, found none"))?;
     let header = match envi::is_header(text.as_bytes()) {
@@ -71,7 +72,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
         return Err(source.error("header TOTALROWBYTES", format!("expected at least {row_bytes}, found {stride}")));
     }
     let rows = Rows { sample: header.sample, order: header.order, start: header.start, stride };
-    let mut raster = Raster::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
+    let mut raster = Decoded::new(header.format, header.sample.name(), size, rows.read(source, size, count)?);
     if let Some(text) = &header.nodata {
         raster.declare_nodata("header NODATA", text, options);
     }

@@ -324,8 +324,7 @@ fn range_of_terrain(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2]
     if !surface::has_terrain(field, first.map(|n| n as i32), last.map(|n| n as i32)) {
         return Square::NOTHING.range;
     }
-    let heights = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i, j)));
-    heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
+    field.range_of(first, last)
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub struct DiskCache {
 impl DiskCache {
     /// The place of what `name` says, beside the field's file, if the field has one.
     pub fn new(field: &Field, name: &str) -> Option<Self> {
-        let source = field.source.as_deref()?;
+        let source = field.file.as_deref()?;
         let mut path = source.as_os_str().to_owned();
         path.push(format!(".cuesta-{name}"));
         Some(Self { path: path.into(), key: key(field) })
@@ -74,7 +74,7 @@ mod tests {
 
     fn field(source: &Path, heights: [f32; 4]) -> Field {
         let mut field = Field::new(Samples::F32(heights.to_vec()), [2, 2], [1.0; 2], Holes::none(4));
-        field.source = Some(source.into());
+        field.file = Some(source.into());
         field
     }
 

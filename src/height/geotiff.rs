@@ -3,10 +3,11 @@
 use tiff::{decoder::Decoder, tags::Tag};
 
 use super::{
-    Error, geokeys,
+    Error,
+    decoded::Decoded,
+    geokeys,
     load::{Options, Source},
     metadata,
-    raster::Raster,
     sidecar::Georeference,
     terrain_rgb::Encoding,
     tiff_bands::Bands,
@@ -16,7 +17,7 @@ use super::{
 };
 
 /// Reads the heights.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     tiff_directory::check(source, options)?;
     let (name, len) = (source.name, source.len);
     let mut decoder = Decoder::new(&mut source.reader).map_err(|e| Error::new(name, "directory", e))?;
@@ -30,7 +31,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let (affine, crs) = geokeys::read(&mut decoder, &mut warnings);
     let format = if affine.is_some() { "GeoTIFF" } else { "TIFF" };
     let sample_type = bands.encoding.map_or(layout.packing.name(), |encoding| encoding.name().to_owned());
-    let mut raster = Raster::new(format, &sample_type, [w, h], samples);
+    let mut raster = Decoded::new(format, &sample_type, [w, h], samples);
     raster.holes = holes;
     raster.step = bands.encoding.map_or(1.0, Encoding::step);
     raster.warnings = warnings;

@@ -4,9 +4,9 @@
 
 use super::{
     Error,
+    decoded::Decoded,
     georef::{Place, Unit, metres_per_degree},
     load::{Options, Source},
-    raster::Raster,
     raw::Rows,
     sample::{Order, SampleType},
 };
@@ -22,7 +22,7 @@ pub(super) fn size(len: u64) -> Option<[u32; 2]> {
 }
 
 /// Reads a tile.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let expected = "expected 1201², 3601², 7201² or 1801 x 3601 samples of 2 bytes";
     let size = size(source.len).ok_or_else(|| source.error("length", expected))?;
     let corner = source.name.rsplit(['/', '\\']).find_map(Corner::of);
@@ -32,7 +32,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let count = source.samples(size.map(u64::from), options)?;
     let rows = Rows { sample: SampleType::I16, order: Order::Big, start: 0, stride: u64::from(size[0]) * 2 };
     let samples = rows.read(source, size, count)?;
-    let mut raster = Raster::new("SRTM HGT", "i16", size, samples);
+    let mut raster = Decoded::new("SRTM HGT", "i16", size, samples);
     raster.nodata = Some(VOID);
     if corner.is_none() {
         raster.warnings.push("the name has no position as N42E001 has: taken to lie at 0°N 0°E".to_owned());

@@ -140,7 +140,7 @@ static TEXT: &[Known] = &[
     known(0, b"name\t=", "a SAGA header (.sgrd)", RASTER),
     known(0, b"file format :", "an Idrisi header (.rdc)", RASTER),
     known(0, b"[basemap]", "an ILWIS map", RASTER),
-    known(0, b"<mrf_meta>", "a Meta Raster Format description (.mrf)", RASTER),
+    known(0, b"<mrf_meta>", "a Meta Decoded Format description (.mrf)", RASTER),
     known(0, b"<pamdataset", "the metadata of a raster (.aux.xml)", "give the raster beside it instead"),
     known(0, b"#vrml", "VRML", MESH),
     known(0, b"solid ", "an STL mesh", MESH),

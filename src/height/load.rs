@@ -9,8 +9,8 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Error, Field, Footprint, archive, asc, bil, folder, geotiff, hgt, known_formats::Known, mosaic::Parts, png,
-    raster::Raster, raw, sidecar, terrain_rgb, text, tiles, usgs_dem,
+    Error, Field, Footprint, archive, asc, bil, decoded::Decoded, folder, geotiff, hgt, known_formats::Known,
+    mosaic::Parts, png, raw, sidecar, terrain_rgb, text, tiles, usgs_dem,
 };
 pub use super::{raw::RawLayout, terrain_rgb::Encoding};
 
@@ -106,7 +106,7 @@ pub struct SourceFile {
 
 impl SourceFile {
     /// The file of a raster whose north-west sample lies at a column and row.
-    pub(super) fn of(file: &str, raster: &Raster, at: [u32; 2]) -> Self {
+    pub(super) fn of(file: &str, raster: &Decoded, at: [u32; 2]) -> Self {
         Self { file: file.to_owned(), format: raster.format, at, size: raster.size }
     }
 }
@@ -362,13 +362,13 @@ pub(super) fn gather(source: &mut Source, kind: Kind, options: &Options, parts: 
 }
 
 /// Reads a source of a format that is one raster, and the files beside it.
-pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, kind: Kind, options: &Options) -> Result<Decoded, Error> {
     let mut raster = decode(source, kind, options)?;
     sidecar::settle(source, options, &mut raster);
     Ok(raster)
 }
 
-fn decode(source: &mut Source, kind: Kind, options: &Options) -> Result<Raster, Error> {
+fn decode(source: &mut Source, kind: Kind, options: &Options) -> Result<Decoded, Error> {
     if kind != Kind::Tiff {
         one_band(source.name, options)?;
     }

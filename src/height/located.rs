@@ -5,10 +5,11 @@ use std::path::Path;
 use tiff::decoder::Decoder;
 
 use super::{
-    Error, Samples, geokeys,
+    Error, Samples,
+    decoded::Decoded,
+    geokeys,
     georef::Place,
     load::{self, Options, Source},
-    raster::Raster,
     sidecar::{self, Georeference},
 };
 
@@ -45,7 +46,7 @@ pub fn place_of(path: &Path, size: [u32; 2]) -> Result<Located, Error> {
 }
 
 fn located(source: &mut Source, size: [u32; 2]) -> Located {
-    let mut raster = Raster::new("picture", "u8", size, Samples::F32(Vec::new()));
+    let mut raster = Decoded::new("picture", "u8", size, Samples::F32(Vec::new()));
     if let Ok(mut decoder) = Decoder::new(&mut source.reader) {
         let (affine, crs) = geokeys::read(&mut decoder, &mut raster.warnings);
         raster.georeference = Georeference { affine, crs, ..Georeference::default() };
@@ -53,7 +54,7 @@ fn located(source: &mut Source, size: [u32; 2]) -> Located {
     // Its values are colours, whose unit does not matter.
     let options = Options { height_scale: Some(1.0), ..Options::default() };
     sidecar::settle(source, &options, &mut raster);
-    let Raster { place, turn, mut warnings, .. } = raster;
+    let Decoded { place, turn, mut warnings, .. } = raster;
     // A guess at the unit does not matter: coordinates without a system are the terrain's.
     warnings.retain(|warning| !warning.contains("--spacing"));
     Located { place, transposed: turn.transposed, flip: turn.flip, warnings }

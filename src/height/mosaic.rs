@@ -2,9 +2,9 @@
 
 use super::{
     Error, Holes, Samples,
+    decoded::Decoded,
     georef::{Place, Unit},
     load::{self, Options, SourceFile},
-    raster::Raster,
 };
 
 /// Distance from the common grid up to which a file counts as on it, samples: coordinates are rounded in files.
@@ -16,7 +16,7 @@ const NEAR_GRID: f64 = 0.25;
 pub(super) struct Part {
     /// The file's name in messages.
     pub name: String,
-    pub raster: Raster,
+    pub raster: Decoded,
 }
 
 impl Part {
@@ -52,7 +52,7 @@ impl Parts {
         &mut self,
         name: &str,
         options: &Options,
-        read: impl FnOnce(&Options) -> Result<Raster, Error>,
+        read: impl FnOnce(&Options) -> Result<Decoded, Error>,
     ) -> Result<(), Error> {
         let left = options.max_samples - self.samples.min(options.max_samples);
         let raster = read(&Options { max_samples: left, ..options.clone() }).map_err(|mut error| {
@@ -94,7 +94,7 @@ impl Parts {
     }
 
     /// Combines the rasters. Where several have data the last one counts; where none has data there is a hole.
-    pub fn join(self, name: &str, options: &Options) -> Result<(Raster, Vec<SourceFile>), Error> {
+    pub fn join(self, name: &str, options: &Options) -> Result<(Decoded, Vec<SourceFile>), Error> {
         let Self { mut list, warnings, .. } = self;
         if let [part] = &mut list[..] {
             let source = SourceFile::of(&part.name, &part.raster, [0, 0]);
@@ -119,7 +119,7 @@ impl Parts {
 }
 
 /// Returns true if two rasters have the same size at the same place.
-fn covers_same(a: &Raster, b: &Raster) -> bool {
+fn covers_same(a: &Decoded, b: &Decoded) -> bool {
     let same = |(a, b): (&Place, &Place)| a.unit == b.unit && offset(a, b).iter().all(|steps| steps.abs() < ON_GRID);
     a.size == b.size && a.place.as_ref().zip(b.place.as_ref()).is_some_and(same)
 }
@@ -258,12 +258,12 @@ struct Canvas {
 impl Canvas {
     /// Copies rasters to their corners, with warnings about overlaps and gaps. Values are copied unchanged if all
     /// files have one unit; otherwise they become metres.
-    fn paint(parts: Vec<Part>, size: [u32; 2], count: usize, corners: &[[u32; 2]]) -> Raster {
+    fn paint(parts: Vec<Part>, size: [u32; 2], count: usize, corners: &[[u32; 2]]) -> Decoded {
         let first = &parts[0].raster;
         let (format, sample_type) = (first.format, first.sample_type.clone());
-        let measure = |raster: &Raster| [raster.step, raster.scale, raster.offset, raster.unit];
+        let measure = |raster: &Decoded| [raster.step, raster.scale, raster.offset, raster.unit];
         let [step, scale, offset, unit] = measure(first);
-        let all = |alike: &dyn Fn(&Raster) -> bool| parts.iter().all(|part| alike(&part.raster));
+        let all = |alike: &dyn Fn(&Decoded) -> bool| parts.iter().all(|part| alike(&part.raster));
         let alike = all(&|raster| measure(raster) == [step, scale, offset, unit]);
         let codes = |samples: &Samples| match samples {
             Samples::Coded { zero, scale, .. } => Some((*zero, *scale)),
@@ -287,7 +287,7 @@ impl Canvas {
         }
         let unit_of_value = if alike { step * scale * unit } else { 1.0 };
         warnings.extend(canvas.warnings(count, unit_of_value));
-        let mut raster = Raster::new(format, &sample_type, size, canvas.samples);
+        let mut raster = Decoded::new(format, &sample_type, size, canvas.samples);
         (0..count).filter(|&k| !canvas.known.contains(k)).for_each(|k| raster.holes.insert(k));
         if alike {
             (raster.step, raster.scale, raster.offset, raster.unit) = (step, scale, offset, unit);
@@ -297,7 +297,7 @@ impl Canvas {
     }
 
     /// Copies a raster whose values become value · factor + offset.
-    fn copy(&mut self, raster: &Raster, [factor, offset]: [f64; 2], [column, row]: [u32; 2]) {
+    fn copy(&mut self, raster: &Decoded, [factor, offset]: [f64; 2], [column, row]: [u32; 2]) {
         let width = raster.size[0] as usize;
         for k in 0..raster.samples.len() {
             let at = (row as usize + k / width) * self.width + column as usize + k % width;

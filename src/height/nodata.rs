@@ -1,6 +1,6 @@
 //! The value that means "no data", as programs write it.
 
-use super::{load::Options, raster::Raster};
+use super::{decoded::Decoded, load::Options};
 
 /// Heights beyond this, metres, are no terrain: programs fill with them where there is no data.
 pub(super) const BEYOND: f64 = 1e30;
@@ -25,7 +25,7 @@ pub fn number(text: &str) -> Option<f64> {
     }
 }
 
-impl Raster {
+impl Decoded {
     /// Takes a file's own text for "no data". A text that is no number says nothing, with a warning.
     pub(super) fn declare_nodata(&mut self, place: &str, text: &str, options: &Options) {
         self.nodata = number(text);

@@ -7,8 +7,8 @@ use png::{BitDepth, ColorType, DecodeOptions, Decoder, DecodingError, Limits, Tr
 
 use super::{
     Error, Holes, Samples,
+    decoded::Decoded,
     load::{self, Options, Source},
-    raster::Raster,
     sample::{Order, SampleType},
     terrain_rgb,
 };
@@ -17,7 +17,7 @@ use super::{
 const EXPANSION: u64 = 1032;
 
 /// Reads grey heights row by row; colour pictures go to [`terrain_rgb`].
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let (name, source_len) = (source.name, source.len);
     let error = |place: String, e: DecodingError| Error::new(name, place, e);
     let mut decoder = checked(&mut source.reader);
@@ -64,7 +64,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     reader.finish().map_err(|e| error("end".to_owned(), e))?;
     let transparent = reader.info().trns.as_ref().filter(|_| target.channels == 1);
     let transparent = transparent.map(|bytes| bytes.iter().fold(0, |value, &b| value << 8 | u32::from(b)));
-    let mut raster = Raster::new("PNG", sample.name(), size, target.samples);
+    let mut raster = Decoded::new("PNG", sample.name(), size, target.samples);
     raster.holes = target.holes;
     raster.nodata = transparent.map(f64::from);
     Ok(raster)

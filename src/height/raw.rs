@@ -4,8 +4,8 @@ use std::{io::SeekFrom, str::FromStr};
 
 use super::{
     Error, Samples,
+    decoded::Decoded,
     load::{Options, Source},
-    raster::Raster,
     sample::{Order, SampleType},
 };
 
@@ -42,7 +42,7 @@ impl FromStr for RawLayout {
 }
 
 /// Reads bare samples of the layout in the options.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let Some(RawLayout { size, sample, order }) = options.raw else {
         return Err(source.error("content", hint(source.len)));
     };
@@ -55,7 +55,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     }
     let rows = Rows { sample, order, start: 0, stride: u64::from(w) * sample.bytes() as u64 };
     let samples = rows.read(source, size, count)?;
-    Ok(Raster::new("raw", sample.name(), size, samples))
+    Ok(Decoded::new("raw", sample.name(), size, samples))
 }
 
 /// Rows of uncompressed samples in a file.

@@ -5,10 +5,10 @@
 use super::{
     affine::{Affine, Turn},
     crs::{self, Crs},
+    decoded::Decoded,
     georef::{Place, Unit},
     load::{Options, Source},
     metadata::{self, Metadata},
-    raster::Raster,
     units, world_file,
 };
 
@@ -24,7 +24,7 @@ pub(super) struct Georeference {
 }
 
 /// Settles the place, the turn, the scale and the unit of a raster.
-pub(super) fn settle(source: &Source, options: &Options, raster: &mut Raster) {
+pub(super) fn settle(source: &Source, options: &Options, raster: &mut Decoded) {
     let stated = std::mem::take(&mut raster.georeference);
     let beside = source
         .sibling_text("aux.xml")
@@ -47,7 +47,7 @@ pub(super) fn settle(source: &Source, options: &Options, raster: &mut Raster) {
 }
 
 /// The transformation of a world file, where the format has no position of its own.
-fn world(source: &Source, raster: &mut Raster) -> Option<Affine> {
+fn world(source: &Source, raster: &mut Decoded) -> Option<Affine> {
     if raster.place.is_some() {
         return None;
     }
@@ -61,7 +61,7 @@ fn world(source: &Source, raster: &mut Raster) -> Option<Affine> {
 }
 
 /// The system of the `.prj` beside a file that names none.
-fn projection(source: &Source, raster: &mut Raster) -> Option<Crs> {
+fn projection(source: &Source, raster: &mut Decoded) -> Option<Crs> {
     if raster.place.is_some() {
         return None;
     }
@@ -74,7 +74,7 @@ fn projection(source: &Source, raster: &mut Raster) -> Option<Crs> {
 }
 
 /// Lays the raster north up at its coordinates.
-fn lay(raster: &mut Raster, affine: Affine, crs: &Crs) {
+fn lay(raster: &mut Decoded, affine: Affine, crs: &Crs) {
     let Some(laid) = affine.laid(raster.size) else {
         raster.warnings.push("the georeference is degenerate and ignored".to_owned());
         return;
@@ -101,7 +101,7 @@ fn lay(raster: &mut Raster, affine: Affine, crs: &Crs) {
 
 /// Settles metres a unit of height: by the band, else by the vertical system, else metres with a warning where the
 /// horizontal unit makes another one likely.
-fn settle_heights(raster: &mut Raster, options: &Options, crs: &Crs, band_unit: Option<&str>) {
+fn settle_heights(raster: &mut Decoded, options: &Options, crs: &Crs, band_unit: Option<&str>) {
     let by_band = band_unit.and_then(units::named_length);
     if let (Some(name), None) = (band_unit, by_band) {
         raster.warnings.push(format!("band unit: expected a length, found {name:?}; taken as metres (--height-scale)"));

@@ -6,9 +6,9 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Lim
 
 use super::{
     Error, Holes, Samples,
+    decoded::Decoded,
     load::{self, Options, Source},
     png,
-    raster::Raster,
 };
 
 /// How a colour means a height.
@@ -75,14 +75,14 @@ pub(super) fn asked(name: &str, options: &Options) -> Result<Encoding, Error> {
 }
 
 /// Reads a colour picture that encodes heights.
-pub(super) fn read(source: &mut Source, format: &'static str, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, format: &'static str, options: &Options) -> Result<Decoded, Error> {
     let encoding = asked(source.name, options)?;
     let picture = decode(source.name, &mut source.reader, options)?;
     let (w, h) = picture.dimensions();
     let count = source.samples([w, h].map(u64::from), options)?;
     let (mut heights, mut holes) = (vec![0.0; count], Holes::none(count));
     encoding.store(picture.as_raw(), 4, &mut heights, &mut holes, 0);
-    let mut raster = Raster::new(format, encoding.name(), [w, h], Samples::F32(heights));
+    let mut raster = Decoded::new(format, encoding.name(), [w, h], Samples::F32(heights));
     raster.holes = holes;
     raster.step = encoding.step();
     Ok(raster)

@@ -9,8 +9,8 @@ use std::{
 
 use super::{
     Error, Holes, Samples,
+    decoded::Decoded,
     load::{self, Options},
-    raster::Raster,
     terrain_rgb::{self, Encoding},
     tile_grid::TileGrid,
 };
@@ -31,7 +31,7 @@ const MAX_ZOOM: u32 = 30;
 const TILE_BYTES: u64 = 1 << 26;
 
 /// Reads the bounding rectangle of the tiles at one zoom level; absent and empty tiles are holes.
-pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Decoded, Error> {
     let name = path.display().to_string();
     load::one_band(&name, options)?;
     let Tiles { grid, levels } = tiles;
@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Raste
         Encoding::Mapbox => "Terrain-RGB tiles",
     };
     let holes = mosaic.holes();
-    let mut raster = Raster::new(format, encoding.name(), mosaic.size, Samples::F32(mosaic.heights));
+    let mut raster = Decoded::new(format, encoding.name(), mosaic.size, Samples::F32(mosaic.heights));
     raster.holes = holes;
     raster.step = encoding.step();
     raster.place = Some(place);

@@ -8,9 +8,9 @@ use std::io::SeekFrom;
 use super::{
     Error, Holes, Samples,
     crs::{self, Crs},
+    decoded::Decoded,
     georef::{FOOT, Place, Unit},
     load::{Options, Source},
-    raster::Raster,
 };
 
 /// Bytes of a record.
@@ -115,7 +115,7 @@ struct Profile {
 }
 
 /// Reads a grid; cells outside the profiles are holes.
-pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Error> {
+pub(super) fn read(source: &mut Source, options: &Options) -> Result<Decoded, Error> {
     let mut record = [0; RECORD];
     source.need("record A", 2 * RECORD as u64)?;
     source.reader.read_exact(&mut record).map_err(|e| source.error("record A", e))?;
@@ -165,7 +165,7 @@ pub(super) fn read(source: &mut Source, options: &Options) -> Result<Raster, Err
     let mut holes = Holes::none(count);
     (0..count).filter(|&k| !known.contains(k)).for_each(|k| holes.insert(k));
 
-    let mut raster = Raster::new("USGS DEM", "text", size.map(|n| n as u32), Samples::F32(heights));
+    let mut raster = Decoded::new("USGS DEM", "text", size.map(|n| n as u32), Samples::F32(heights));
     raster.holes = holes;
     raster.step = header.step[2];
     let height_unit = Some(if header.height_unit == 1 { FOOT } else { 1.0 });
