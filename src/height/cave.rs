@@ -1,4 +1,4 @@
-//! A cave: a floor and a ceiling over the same samples, which meet where there is rock between them.
+//! Caves: a floor and a ceiling over the same samples, which meet at rock.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use super::{Error, Field, Holes, Raster, Samples};
 
 /// Floor and ceiling of a cave, welded: at samples of rock both have the same height.
 ///
-/// A sample is rock where the ceiling is not above the floor, or where one of the two has no data. Rock beside the cave
-/// lies half-way between what floor and ceiling were there, where surfaces through their samples would about meet, and
-/// rock further in goes on smoothly from there. A triangle whose corners are all rock thus is in both surfaces, with
-/// nothing between them: drawn by neither, it leaves them with one common edge.
+/// A sample is rock if the ceiling is not above the floor, or if one of the two has no data. Rock beside the cave lies
+/// half-way between floor and ceiling, about where surfaces through their samples would meet. Rock further in continues
+/// smoothly from there. A triangle with three rock corners is the same in both surfaces. It is drawn by neither, so that
+/// floor and ceiling end in one common edge.
 #[derive(Clone, Debug)]
 pub struct Cave {
     floor: Arc<Field>,
@@ -20,10 +20,10 @@ pub struct Cave {
 }
 
 impl Cave {
-    /// Welds two fields. `file` names the ceiling's in errors.
+    /// Welds two fields. `file` is the name of the ceiling's file in errors.
     ///
     /// # Errors
-    /// If the ceiling has not the floor's size, tiles, spacing and origin.
+    /// If the ceiling differs from the floor in size, tiling, spacing or origin.
     pub fn new(floor: &Field, ceiling: &Field, file: &str) -> Result<Self, Error> {
         let differs = |place: &str, expected: String, found: String| {
             Error::new(file, place, format!("expected the floor's {expected}, found {found}"))
@@ -59,23 +59,23 @@ impl Cave {
         Self { floor: Arc::new(floor.with_source(Arc::new(source))), ceiling }
     }
 
-    /// The cave that a field is the floor of.
+    /// Returns the cave that a field is the floor of.
     pub fn of(floor: &Arc<Field>) -> Option<Self> {
         let ceiling = Arc::clone(floor.ceiling()?);
         Some(Self { floor: Arc::clone(floor), ceiling })
     }
 
-    /// The floor, which knows its ceiling: it stands for the cave wherever a field is asked for.
+    /// Returns the floor. Its source holds the ceiling, so that it stands for the cave wherever a field is needed.
     pub fn floor(&self) -> &Arc<Field> {
         &self.floor
     }
 
-    /// The ceiling, nowhere below the floor.
+    /// Returns the ceiling, nowhere below the floor.
     pub fn ceiling(&self) -> &Arc<Field> {
         &self.ceiling
     }
 
-    /// Whether there is nothing between floor and ceiling at a sample.
+    /// Returns true if floor and ceiling meet at a sample.
     #[inline]
     pub fn is_rock(&self, i: u32, j: u32) -> bool {
         self.floor.height(i, j) == self.ceiling.height(i, j)

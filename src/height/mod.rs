@@ -37,7 +37,7 @@ pub use samples::Samples;
 pub use source::{Block, Coverage, HeightSource};
 pub use tiled::Tiled;
 
-/// What is wrong with a file or a wish about it: the file, the field or position in it, and what was found.
+/// An error about a file or an option: the file, the field or position in it, what was expected and what was found.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {place}: {what}")]
 pub struct Error {
@@ -45,18 +45,19 @@ pub struct Error {
     pub file: String,
     /// The header field, line, row or byte position at fault.
     pub place: String,
-    /// What was expected and what was found.
+    /// The expected and the found content.
     pub what: String,
 }
 
 impl Error {
-    /// An error at a place of a file.
+    /// Makes an error at a place of a file.
     pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
         Self { file: file.into(), place: place.into(), what: one_line(what.to_string()) }
     }
 }
 
-/// The text with spaces in place of line breaks and other control characters: decoders quote bytes of broken files.
+/// Returns the text with spaces in place of line breaks and other control characters: decoders quote bytes of broken
+/// files.
 fn one_line(text: String) -> String {
     if text.contains(char::is_control) { text.replace(char::is_control, " ") } else { text }
 }

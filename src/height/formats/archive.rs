@@ -17,9 +17,9 @@ use super::{
 };
 use crate::height::Error;
 
-/// The most bytes a member may unpack to; larger files are to be unpacked first.
+/// Most bytes of an unpacked member; larger files must be unpacked first.
 const UNPACKED_BYTES: u64 = 1 << 31;
-/// The most members looked at.
+/// Most members of an archive.
 const MEMBERS: usize = 1 << 16;
 
 /// Returns true if a file begins as a tar file.
@@ -69,7 +69,7 @@ struct Member {
 /// The files in an archive.
 trait Members {
     fn list(&self) -> &[Member];
-    /// The first bytes of a file, at most `limit`.
+    /// Unpacks the first bytes of a file, at most `limit`.
     fn unpack(&mut self, index: usize, limit: u64) -> Result<Cow<'_, [u8]>, Error>;
 }
 
@@ -186,7 +186,7 @@ fn gather_members(name: &str, members: &mut dyn Members, options: &Options, part
     Ok(())
 }
 
-/// The text beside a member that has another extension: `a.hdr` or `a.bil.hdr`.
+/// Returns the text beside a member that has another extension: `a.hdr` or `a.bil.hdr`.
 fn sibling(texts: &[(String, Vec<u8>)], member: &str, extension: &str) -> Option<Vec<u8>> {
     let stem = member.rsplit_once('.').map_or(member, |(stem, _)| stem);
     let is_beside = |other: &str, stem: &str| {
@@ -194,11 +194,11 @@ fn sibling(texts: &[(String, Vec<u8>)], member: &str, extension: &str) -> Option
         other != member && rest.is_some_and(|rest| rest.eq_ignore_ascii_case(extension))
     };
     let beside = |stem: &str| texts.iter().find(|(other, _)| is_beside(other, stem));
-    // The name with its own extension is of this file alone.
+    // `a.bil.hdr` belongs to this file alone, `a.hdr` perhaps to several.
     beside(member).or_else(|| beside(stem)).map(|(_, text)| text.clone())
 }
 
-/// No format needs more than 16 bytes a sample, but for texts of unusual length.
+/// Returns the most bytes of an unpacked member: no format needs more than 16 per sample, except unusually long texts.
 fn limit(options: &Options) -> u64 {
     options.max_samples.saturating_mul(16).clamp(1 << 16, UNPACKED_BYTES)
 }

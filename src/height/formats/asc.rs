@@ -26,7 +26,7 @@ const KEYS: [&str; 11] = [
     "nodata",
 ];
 
-/// Whether a file begins as a grid does.
+/// Returns true if a file begins with a key of a grid's header.
 pub(super) fn is_header(head: &[u8]) -> bool {
     let word = head.trim_ascii_start().split(u8::is_ascii_whitespace).next().unwrap_or_default();
     KEYS.iter().any(|key| word.eq_ignore_ascii_case(key.as_bytes()))
@@ -38,7 +38,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     let header = Header::read(input, &mut words)?;
     let size = header.size(input)?;
     let count = input.samples(size, options)?;
-    // A height takes a digit and a space, but for the last.
+    // Each height takes a digit and a space, except the last.
     input.need("heights", (count as u64).saturating_mul(2) - 1)?;
     let heights = read_heights(input, &mut words, count)?;
     let size = size.map(|n| n as u32);
@@ -79,7 +79,7 @@ impl Header {
         Ok([side("ncols")?, side("nrows")?])
     }
 
-    /// Where the samples lie.
+    /// Returns the position of the samples.
     fn grid(&self, input: &Input, [_, rows]: [u32; 2]) -> Result<Grid, Error> {
         let step = [self.value(&["dx", "cellsize"]), self.value(&["dy", "cellsize"])];
         let [Some(dx), Some(dy)] = step else {

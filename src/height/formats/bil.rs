@@ -28,7 +28,7 @@ pub(super) const ABOUT: &str = "also ESRI FLT and ENVI: bare samples with a `.hd
 /// Keys that a header of bare samples has and an ASCII grid lacks.
 const OWN_KEYS: [&str; 5] = ["byteorder", "layout", "nbits", "pixeltype", "nbands"];
 
-/// Whether a file is such a header.
+/// Returns true if a file begins as such a header.
 pub(super) fn is_header(head: &[u8]) -> bool {
     let first_words =
         || head.split(|&b| b == b'\n').filter_map(|line| line.trim_ascii().split(u8::is_ascii_whitespace).next());
@@ -38,14 +38,14 @@ pub(super) fn is_header(head: &[u8]) -> bool {
         || words.next().is_some_and(|word| is_own(word) || asc::is_header(word)) && first_words().any(is_own)
 }
 
-/// The data file beside a header.
+/// Returns the data file beside a header.
 pub(super) fn data_beside(header: &Path) -> Option<PathBuf> {
     let extensions = ["bil", "flt", "bip", "bsq", "img", "dat", "raw", "bin", "dem", ""];
     let extensions = extensions.iter().flat_map(|e| [e.to_string(), e.to_uppercase()]);
     extensions.map(|e| header.with_extension(e)).find(|path| path.is_file())
 }
 
-/// What a header says.
+/// The content of a header.
 pub(super) struct Header {
     /// Name of the format, if other than that of the row.
     pub variant: Option<&'static str>,
@@ -143,8 +143,8 @@ fn parse(name: &str, text: &str) -> Result<Header, Error> {
     })
 }
 
-/// A `.flt` header has no NBITS. A `.bil` header without PIXELTYPE means unsigned, but the tiles of GTOPO30
-/// say so and have a negative nodata value.
+/// Returns the sample type. A `.flt` header has no NBITS. A `.bil` header without PIXELTYPE means unsigned; headers of
+/// GTOPO30 omit it although their samples are signed; a negative nodata value identifies them.
 fn sample(values: &Values, nodata: Option<f64>) -> Result<SampleType, Error> {
     let kind = values.text("pixeltype").unwrap_or_default().to_uppercase();
     let bits = values.number::<u32>("nbits")?;
@@ -160,7 +160,7 @@ fn sample(values: &Values, nodata: Option<f64>) -> Result<SampleType, Error> {
     }
 }
 
-/// Where the samples lie: ULXMAP is the centre of a sample, XLLCORNER a corner.
+/// Returns the position of the samples: ULXMAP is the centre of a sample, XLLCORNER a corner.
 fn grid(values: &Values, [_, rows]: [u64; 2]) -> Result<Option<Grid>, Error> {
     let number =
         |keys: [&str; 2]| -> Result<Option<f64>, Error> { Ok(values.number(keys[0])?.or(values.number(keys[1])?)) };

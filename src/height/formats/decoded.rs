@@ -1,4 +1,4 @@
-//! What every loader yields, and the common way from there to a field.
+//! The result of every reader, and the common steps from there to a field.
 
 use super::{
     load::{HoleFill, Loaded, Options},
@@ -12,7 +12,7 @@ use crate::height::{
     georef::{Place, affine::Turn},
 };
 
-/// The farthest from 0 that a height may be, metres: f64 holds a tenth of a millimetre there.
+/// Largest absolute height, metres: f64 resolves a tenth of a millimetre there.
 const FARTHEST_M: f64 = 1e12;
 
 /// Samples as a file stores them, before crop, holes and metres.
@@ -21,7 +21,7 @@ pub(super) struct Decoded {
     pub format: &'static str,
     /// Name of the reader's own, in place of that of its row in [`FORMATS`](super::FORMATS).
     pub variant: Option<&'static str>,
-    /// How the file stores a sample.
+    /// Name of the type of a stored sample, as in `i16`.
     pub sample_type: String,
     /// Samples along (x, z).
     pub size: [u32; 2],
@@ -45,7 +45,7 @@ pub(super) struct Decoded {
     pub place: Option<Place>,
     /// The turn that lays the file's samples north up.
     pub turn: Turn,
-    /// What the user should know.
+    /// Warnings for the user, one sentence each.
     pub warnings: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ impl Decoded {
         }
     }
 
-    /// Applies the wishes and makes the field.
+    /// Applies the options and makes the field.
     pub fn finish(mut self, name: &str, options: &Options) -> Result<Loaded, Error> {
         let whole = self.size;
         self.rearrange(name, options)?;
@@ -101,7 +101,7 @@ impl Decoded {
         Ok(Loaded { field, format, sample_type, exact_in_16_bit, footprint, warnings, sources })
     }
 
-    /// The same values with rows from north to south, columns from west to east, and holes in place of its nodata value.
+    /// Returns the same values with rows from north to south, columns from west to east, and holes in place of nodata.
     pub fn settled(mut self, name: &str, options: &Options) -> Result<Self, Error> {
         self.rearrange(name, &Options { crop: None, ..options.clone() })?;
         self.make_holes(options);
@@ -143,7 +143,7 @@ impl Decoded {
         Ok(())
     }
 
-    /// The lowest and highest value, with a warning about what looks like nodata.
+    /// Returns the lowest and highest value, and warns of values that look like undeclared nodata.
     fn check_range(&mut self) -> [f32; 2] {
         let (mut low, mut high) = (Edge::default(), Edge::default());
         for k in (0..self.samples.len()).filter(|&k| self.holes.count() == 0 || !self.holes.contains(k)) {
@@ -174,7 +174,7 @@ impl Decoded {
         [min, max]
     }
 
-    /// Gives samples under holes a value that is in range, so that they decide nothing.
+    /// Sets samples under holes to a value in range, so that they do not affect the choice of codes.
     fn blank_holes(&mut self, [min, _]: [f32; 2]) {
         if let Samples::F32(heights) = &mut self.samples
             && self.holes.count() > 0
@@ -184,7 +184,7 @@ impl Decoded {
         }
     }
 
-    /// Warns where nothing states spacing or scale, and makes up a scale where values cannot be metres.
+    /// Warns if neither spacing nor scale is stated, and assumes a scale if the values cannot be metres.
     fn assume_scale(&mut self, options: &Options, range: [f32; 2]) {
         if self.place.is_some() || options.spacing.is_some() {
             return;
@@ -232,14 +232,14 @@ impl Decoded {
         Ok(())
     }
 
-    /// Spacing and origin, metres.
+    /// Returns spacing and origin, metres.
     fn lie(&self, name: &str, options: &Options) -> Result<([f64; 2], [f64; 2]), Error> {
         let (spacing, origin) = match &self.place {
             Some(place) => place.spacing_and_origin(self.size[1]),
             None => ([1.0; 2], [0.0; 2]),
         };
         let spacing = options.spacing.unwrap_or(spacing);
-        // Positions are f64 metres and become f32 about the eye: both ends far beyond any planet.
+        // Positions are f64 metres, and f32 relative to the eye. Both limits are far beyond any planet.
         if spacing.iter().any(|s| !(1e-6..=1e9).contains(s)) || origin.iter().any(|o| !(-1e12..=1e12).contains(o)) {
             let what = format!("expected a spacing of 1e-6 to 1e9 m, found {spacing:?} m at {origin:?} m");
             return Err(Error::new(name, "spacing", what));
@@ -248,11 +248,11 @@ impl Decoded {
     }
 }
 
-/// Samples of a side of a field at most, tiling included: lattice coordinates are i32, and the last block of a
-/// level may end beyond the field by its own length.
+/// Most samples along a side of a field, tiling included: lattice coordinates are i32, and the last block of a level may
+/// end beyond the field by its own length.
 pub const MAX_SIDE: u32 = 1 << 30;
 
-/// How often the field repeats.
+/// Returns the repetitions of the field along (x, z).
 fn tiles(name: &str, [w, h]: [u32; 2], options: &Options) -> Result<[u32; 2], Error> {
     let [nx, nz] = options.tiles.unwrap_or([1, 1]);
     if nx == 0 || nz == 0 {
@@ -299,7 +299,7 @@ fn distance(a: f32, b: f32) -> f64 {
     (f64::from(a) - f64::from(b)).abs()
 }
 
-/// Whether a value is one that programs like to mean "no data".
+/// Returns true for a value that programs commonly use for "no data".
 fn is_usual(value: f64) -> bool {
     // −10000 m is black in Mapbox Terrain-RGB.
     const USUAL: [f64; 9] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -10000.0, -99999.0, -999.0, 9999.0];

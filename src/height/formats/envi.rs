@@ -12,7 +12,7 @@ use crate::height::{
     georef::{Ellipsoid, Unit, affine::Affine, crs, crs::Crs, units},
 };
 
-/// Whether a file is such a header.
+/// Returns true if a file begins as such a header.
 pub(super) fn is_header(head: &[u8]) -> bool {
     head.strip_prefix(b"ENVI").is_some_and(|rest| rest.trim_ascii_start().len() < rest.len())
 }
@@ -109,7 +109,7 @@ fn affine(values: &Values, fields: &[&str]) -> Result<Affine, Error> {
         None => 0.0,
     };
     let (sin, cos) = rotation.to_radians().sin_cos();
-    // A quarter turn has no rounding left across its axes.
+    // Quarter turns become exact.
     let [sin, cos] = [sin, cos].map(|part| if part.abs() < 1e-12 { 0.0 } else { part });
     let at_reference = Affine { origin: [east, north], column: [dx * cos, dy * sin], row: [dx * sin, -dy * cos] };
     Ok(at_reference.shifted([1.5 - column, 1.5 - row]))

@@ -85,7 +85,7 @@ impl LeftOut {
         }
     }
 
-    /// The first names, after a colon; empty where nothing was left out.
+    /// Returns the first names after a colon; empty if nothing was left out.
     pub fn list(&self) -> String {
         let Self(names) = self;
         match names.len() {
@@ -95,7 +95,7 @@ impl LeftOut {
         }
     }
 
-    /// A warning that names them.
+    /// Returns a warning that names them.
     pub fn warning(&self, folder: &str) -> Option<String> {
         let (count, list) = (self.0.len(), self.list());
         (count > 0).then(|| format!("{folder}: {count} files hold no heights that can be read and are left out{list}"))

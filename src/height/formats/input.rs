@@ -1,4 +1,4 @@
-//! One file as readers see it: its bytes, and the small files beside it.
+//! A file as readers see it: its bytes, and the small files beside it.
 
 use std::{
     fs::File,
@@ -20,7 +20,7 @@ pub(super) fn with_input<T>(path: &Path, read: impl FnOnce(&mut Input) -> Result
 /// Opens a regular file, and returns its length in bytes.
 pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     let error = |e: io::Error| Error::new(path.display().to_string(), "file", format!("expected a readable file, {e}"));
-    // A pipe would wait for its writer to be opened.
+    // Opening a pipe would wait for its writer.
     if !std::fs::metadata(path).map_err(error)?.is_file() {
         return Err(error(io::Error::other("found neither a file nor a directory")));
     }
@@ -32,12 +32,12 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
 /// The most bytes read from a file beside the data: headers and projections are short texts.
 pub(super) const SIBLING_BYTES: u64 = 1 << 24;
 
-/// The file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
+/// Reads the file beside `path` with another extension: `a.hdr` or `a.bil.hdr`.
 pub(super) fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
     let mut appended = path.as_os_str().to_owned();
     appended.push(format!(".{extension}"));
     let upper = extension.to_uppercase();
-    // The name with its own extension is of this file alone.
+    // `a.bil.hdr` belongs to this file alone, `a.hdr` perhaps to several.
     [appended.into(), path.with_extension(extension), path.with_extension(upper)]
         .into_iter()
         .filter(|other| other != path && other.is_file())
@@ -48,7 +48,8 @@ pub(super) fn sibling(path: &Path, extension: &str) -> Option<Vec<u8>> {
         })
 }
 
-/// What loaders read from. Nothing is mapped into memory: a file that shrinks while it is read is a read that fails.
+/// Source of a reader's bytes. Files are not mapped into memory, so that one that shrinks while it is read is an error
+/// and no crash.
 pub(super) trait ReadSeek: BufRead + Seek {}
 impl<T: BufRead + Seek> ReadSeek for T {}
 
@@ -58,7 +59,7 @@ pub(super) struct Input<'a> {
     pub name: &'a str,
     /// The bytes, from the beginning.
     pub reader: &'a mut dyn ReadSeek,
-    /// How many bytes there are.
+    /// Number of bytes.
     pub len: u64,
     /// The file beside this one that has the given extension.
     pub siblings: &'a dyn Fn(&str) -> Option<Vec<u8>>,
@@ -76,7 +77,7 @@ impl Input<'_> {
         (self.siblings)(extension).map(text)
     }
 
-    /// The number of samples of a size, if it is allowed.
+    /// Returns the number of samples of a size, if the options allow it.
     pub fn samples(&self, size: [u64; 2], options: &Options) -> Result<usize, Error> {
         samples(self.name, size, options)
     }
@@ -98,7 +99,7 @@ impl Input<'_> {
     }
 }
 
-/// The number of samples of a size, if it is allowed.
+/// Returns the number of samples of a size, if the options allow it.
 pub(super) fn samples(name: &str, [w, h]: [u64; 2], options: &Options) -> Result<usize, Error> {
     if w < 2 || h < 2 {
         return Err(Error::new(name, "size", format!("expected at least 2x2 samples, found {w}x{h}")));
@@ -112,7 +113,7 @@ pub(super) fn samples(name: &str, [w, h]: [u64; 2], options: &Options) -> Result
     }
 }
 
-/// Refuses another band than the first, for formats that have no other.
+/// Fails if the options request another band than the first, for formats that have one.
 pub(super) fn one_band(name: &str, options: &Options) -> Result<(), Error> {
     match options.band {
         None | Some(1) => Ok(()),

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::height::{Error, Field};
 
-/// What is done with samples without data.
+/// Treatment of samples without data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HoleFill {
     /// They stay holes.
@@ -24,7 +24,7 @@ pub enum HoleFill {
     Interpolate,
 }
 
-/// Wishes about how a file is read.
+/// Options for reading a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Distance of neighbouring samples (x, z), metres, instead of what the file says.
@@ -39,11 +39,11 @@ pub struct Options {
     pub raw: Option<RawLayout>,
     /// The part to keep: x, z, width, height in samples.
     pub crop: Option<[u32; 4]>,
-    /// How often the field repeats along (x, z).
+    /// Repetitions of the field along (x, z).
     pub tiles: Option<[u32; 2]>,
-    /// What is done with samples without data.
+    /// Treatment of samples without data.
     pub hole_fill: HoleFill,
-    /// How a colour picture encodes heights.
+    /// Encoding of heights in the colours of a picture.
     pub encoding: Option<Encoding>,
     /// The band of a file of several, from 1; by default the first, or the colours of a picture.
     pub band: Option<u32>,
@@ -72,26 +72,26 @@ impl Default for Options {
     }
 }
 
-/// A field read from a file, and what is worth saying about it.
+/// A field read from a file, and information about the file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The heights.
     pub field: Field,
     /// Name of the file format.
     pub format: &'static str,
-    /// How the file stores a sample, as in `i16`.
+    /// Name of the type of a stored sample, as in `i16`.
     pub sample_type: String,
-    /// Whether 16 bits a sample hold every height without loss.
+    /// True if 16 bits a sample hold every height without loss.
     pub exact_in_16_bit: bool,
-    /// Which part of the file it is, and where that lies.
+    /// Part of the file that was read, and its position.
     pub footprint: Footprint,
-    /// What the user should know, one sentence each.
+    /// Warnings for the user, one sentence each.
     pub warnings: Vec<String>,
     /// The files that the heights come from, in the order in which a later one overlies an earlier one.
     pub sources: Vec<SourceFile>,
 }
 
-/// A file that heights come from, and where it lies in the field before crop.
+/// A file that heights come from, and its position in the field before the crop.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SourceFile {
     /// The file's name; of a member of an archive after the archive's name.
@@ -116,8 +116,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
     load_all(&[path], options)
 }
 
-/// Reads files and folders as one field: a mosaic of one grid, where a later file overlies an earlier one and what
-/// lies in none is a hole.
+/// Reads files and folders as one field: a mosaic of one grid. A later file overlies an earlier one, and samples in no
+/// file are holes.
 pub fn load_all(paths: &[&Path], options: &Options) -> Result<Loaded, Error> {
     let mut parts = Parts::default();
     for path in paths {
@@ -155,7 +155,7 @@ pub fn load_bytes_with(
 fn finish(parts: Parts, name: &str, options: &Options) -> Result<Loaded, Error> {
     let is_mosaic = parts.len() > 1;
     let (raster, sources) = parts.join(name, options)?;
-    // Each file's own holes are made by then, and its values need not be those of the others.
+    // In a mosaic each file's nodata became holes before, and its value may be a height in another file.
     let nodata = options.nodata.filter(|_| !is_mosaic);
     let loaded = raster.finish(name, &Options { nodata, ..options.clone() })?;
     Ok(Loaded { sources, ..loaded })
@@ -243,7 +243,7 @@ mod tests {
     use super::*;
     use crate::height::{Holes, Samples, save};
 
-    /// A file that has changed by the time of its second look: what was there first, and what is there then.
+    /// A file whose content changes at the first seek.
     struct Changing {
         now: Cursor<Vec<u8>>,
         then: Option<Vec<u8>>,
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Reads a file that is `then` after its format was told.
+    /// Reads a file that becomes `then` once its format is detected.
     fn changed(name: &str, first: &[u8], then: Vec<u8>, raw: Option<RawLayout>) -> Result<Loaded, Error> {
         let len = first.len() as u64;
         let mut reader = BufReader::with_capacity(16, Changing { now: Cursor::new(first.to_vec()), then: Some(then) });
@@ -288,7 +288,7 @@ mod tests {
             let mut refused = 0;
             for left in 0..whole.len() {
                 match changed(&name, &whole, whole[..left].to_vec(), raw) {
-                    // Of a text's last number no one can tell how many digits it had.
+                    // A text's last number may have lost digits unnoticed.
                     Ok(_) if extension == "asc" && left + 3 > whole.len() => {}
                     Ok(loaded) => assert_eq!(loaded.field.samples(), same.field.samples(), "{name}: {left} bytes left"),
                     Err(error) => {

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::height::{Error, Samples, georef::Place};
 
-/// The part of a file that a field is, and its position.
+/// The part of a file that a field was read from, and its position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Footprint {
     /// Samples of the whole file (x, z).
@@ -33,11 +33,11 @@ pub struct Located {
     pub transposed: bool,
     /// Once transposed, columns run west and rows north.
     pub flip: [bool; 2],
-    /// Sentences for the user.
+    /// Warnings for the user, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Reads the position of a picture of this size: from its GeoTIFF tags, `.aux.xml`, world file and `.prj`, as of heights.
+/// Reads the position of a picture of this size from its GeoTIFF tags, `.aux.xml`, world file and `.prj`.
 ///
 /// # Errors
 /// If the file cannot be read.

@@ -4,13 +4,13 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use crate::height::georef::{affine::Affine, crs, crs::Crs};
 
-/// The most elements and texts that are read.
+/// Most elements and texts that are read.
 const MAX_NODES: u32 = 1 << 18;
 
 /// The statements about one band and the place of its raster.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Metadata {
-    /// Units a value counts.
+    /// Units per value.
     pub scale: Option<f64>,
     /// Added to the scaled value, in units.
     pub offset: Option<f64>,
@@ -22,7 +22,7 @@ pub(super) struct Metadata {
     pub affine: Option<Affine>,
     /// The coordinate reference system.
     pub crs: Option<Crs>,
-    /// Statements that were not understood.
+    /// Warnings about values that could not be read.
     pub warnings: Vec<String>,
 }
 
@@ -49,7 +49,7 @@ impl Metadata {
         number
     }
 
-    /// Keeps a scale and an offset that can be applied.
+    /// Drops a scale or offset that cannot be applied, with a warning.
     fn checked(mut self, what: &str) -> Self {
         if self.scale.is_some_and(|scale| !scale.is_finite() || scale == 0.0) {
             self.warnings

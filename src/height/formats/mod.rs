@@ -46,7 +46,7 @@ use super::Error;
 
 /// A format of height files: a row of [`FORMATS`].
 pub struct Format {
-    /// Name, as `info` prints it; with an article where one belongs if the format is not read.
+    /// Name, as `info` prints it; of an unread format with an article where one belongs, for errors.
     pub name: &'static str,
     detect: Detect,
     read: Option<Read>,
@@ -54,7 +54,7 @@ pub struct Format {
     pub about: &'static str,
 }
 
-/// The test that tells a format.
+/// The test that detects a format.
 enum Detect {
     /// These bytes at a position.
     Magic(usize, &'static [u8]),
@@ -138,7 +138,7 @@ impl Format {
     }
 }
 
-/// The beginning of a file, and all else that a format is told by.
+/// The beginning of a file, and all other facts that detect its format.
 struct Head<'a> {
     /// The first bytes, at most [`input::HEAD_BYTES`].
     bytes: &'a [u8],

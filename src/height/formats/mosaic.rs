@@ -1,4 +1,4 @@
-//! One raster out of several that lie on one grid: files named together, a folder, the members of an archive.
+//! Mosaics: one raster from several on one grid, which are files named together, a folder, or members of an archive.
 
 use super::{
     decoded::Decoded,
@@ -23,8 +23,8 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Rank among rasters of the same samples, lowest for heights: the name ends in a word for them, as in
-    /// `N42E001_dem.tif` beside `N42E001_num.tif`, and a sample has more than 8 bits.
+    /// Returns the rank among rasters of the same samples, lowest for heights. Their name ends in a word for heights, as in
+    /// `N42E001_dem.tif` beside `N42E001_num.tif`, and their samples have more than 8 bits.
     fn unlikeliness(&self) -> u32 {
         const HEIGHTS: [&str; 8] = ["dem", "dtm", "dsm", "dhm", "dgm", "hgt", "elevation", "height"];
         let file = self.name.rsplit(['/', '\\']).next().unwrap_or_default().to_lowercase();
@@ -40,7 +40,7 @@ impl Part {
 pub(super) struct Parts {
     list: Vec<Part>,
     samples: u64,
-    /// Warnings about the whole, beside those of each raster.
+    /// Warnings about the mosaic, in addition to those of each raster.
     pub warnings: Vec<String>,
 }
 

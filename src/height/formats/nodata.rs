@@ -2,7 +2,7 @@
 
 use super::{decoded::Decoded, load::Options};
 
-/// Heights beyond this, metres, are no terrain: programs fill with them where there is no data.
+/// Largest absolute value of a height, metres: programs fill samples without data with larger ones.
 pub(super) const BEYOND: f64 = 1e30;
 
 /// Reads a number in the spelling of gdalinfo, of Rust, or of the C library of Windows (`1.#QNAN`, `-1.#IND`, `1.#INF`).
@@ -26,7 +26,7 @@ pub fn number(text: &str) -> Option<f64> {
 }
 
 impl Decoded {
-    /// Takes a file's own text for "no data". A text that is no number says nothing, with a warning.
+    /// Sets the nodata value from a file's text. A text that is no number is ignored with a warning.
     pub(super) fn declare_nodata(&mut self, place: &str, text: &str, options: &Options) {
         self.nodata = number(text);
         if self.nodata.is_none() && options.nodata.is_none() {
@@ -35,7 +35,7 @@ impl Decoded {
         }
     }
 
-    /// Makes holes of the nodata value, of NaN and infinities, and of heights that are none.
+    /// Makes holes of the nodata value, NaN, infinities and values beyond [`BEYOND`].
     pub(super) fn make_holes(&mut self, options: &Options) {
         let nodata = options.nodata.or(self.nodata).map(|value| value / self.step);
         if nodata.is_none() && matches!(self.samples, crate::height::Samples::Coded { .. }) {

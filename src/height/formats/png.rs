@@ -14,7 +14,7 @@ use super::{
 };
 use crate::height::{Error, Holes, Samples};
 
-/// The most bytes that a byte of Deflate data can become.
+/// Most bytes that a byte of Deflate data can expand to.
 const EXPANSION: u64 = 1032;
 
 /// Reads grey heights row by row; colour pictures go to [`terrain_rgb`].
@@ -61,7 +61,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
             target.store(row.data(), j as usize * size[0] as usize);
         }
     }
-    // The last data's checksums are compared where the file ends.
+    // The last checksums are compared at the end of the file.
     reader.finish().map_err(|e| error("end".to_owned(), e))?;
     let transparent = reader.info().trns.as_ref().filter(|_| target.channels == 1);
     let transparent = transparent.map(|bytes| bytes.iter().fold(0, |value, &b| value << 8 | u32::from(b)));
@@ -71,7 +71,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     Ok(raster)
 }
 
-/// A decoder that compares every checksum, of optional chunks too: one of them says which value is transparent.
+/// Returns a decoder that verifies every checksum, of optional chunks too: one of them holds the transparent value.
 fn checked<R: BufRead + Seek>(reader: R) -> Decoder<R> {
     let mut options = DecodeOptions::default();
     options.set_ignore_adler32(false);
@@ -85,7 +85,7 @@ pub(super) fn colours(name: &str, reader: impl input::ReadSeek, options: &Option
     let mut decoder = checked(reader);
     let header = decoder.read_header_info().map_err(error)?;
     let (w, h, depth) = (header.width, header.height, header.bit_depth);
-    // Servers send a picture of one pixel where there is nothing.
+    // Servers send a picture of one pixel for absent tiles.
     input::samples(name, [w, h].map(|n| u64::from(n.max(2))), options)?;
     let count = w as usize * h as usize;
     if depth == BitDepth::Sixteen {
@@ -111,7 +111,7 @@ pub(super) fn colours(name: &str, reader: impl input::ReadSeek, options: &Option
     Ok(picture)
 }
 
-/// Where pixels go.
+/// Samples and holes that pixels are stored to.
 struct Target {
     sample: SampleType,
     channels: usize,

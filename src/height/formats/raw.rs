@@ -72,7 +72,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Reads all rows; `count` samples have been allowed.
+    /// Reads all rows, `count` samples, which the caller has checked against the limit.
     pub fn read(&self, input: &mut Input, [w, h]: [u32; 2], count: usize) -> Result<Samples, Error> {
         let row_bytes = w as usize * self.sample.bytes();
         let needed = self.stride.checked_mul(u64::from(h) - 1).and_then(|n| n.checked_add(row_bytes as u64));
@@ -90,7 +90,7 @@ impl Rows {
     }
 }
 
-/// What to do about a file of no known format: the flag, and the square sizes that would fit.
+/// Returns the error text for a file of no known format: the flag to use, and the square sizes that would fit.
 pub(super) fn hint(len: u64) -> String {
     let fits = |bytes: u64| {
         (len.is_multiple_of(bytes)).then(|| (len / bytes).isqrt()).filter(|n| *n > 1 && n * n * bytes == len)

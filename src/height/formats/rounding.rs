@@ -1,10 +1,10 @@
 //! The loss of heights that are rounded to single precision.
 
-/// Steps of a relief below which a loss is worth saying.
+/// Steps of a relief below which a warning is given.
 const STEPS: f64 = 1000.0;
 
-/// The warning about heights of a wider type whose relief has few steps left in single precision. `range` is that of the
-/// values, of which each counts `metres`.
+/// Returns a warning about heights of a wider type whose relief has few steps left in single precision. `range` is that
+/// of the values, in units of `metres`.
 pub(super) fn warning(sample_type: &str, range: [f32; 2], metres: f64) -> Option<String> {
     let is_wider = !["u8", "i8", "u16", "i16", "f16", "f32"].contains(&sample_type);
     let [low, high] = range.map(f64::from);
@@ -27,7 +27,7 @@ pub(super) fn warning(sample_type: &str, range: [f32; 2], metres: f64) -> Option
     ))
 }
 
-/// A length with three digits.
+/// Formats a length with three digits.
 fn short(metres: f64) -> f64 {
     let unit = 10f64.powf(metres.abs().log10().floor() - 2.0);
     (metres / unit).round() * unit

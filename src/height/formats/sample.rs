@@ -1,4 +1,4 @@
-//! The number types files store samples as.
+//! The number types of stored samples.
 
 use half::f16;
 
@@ -14,7 +14,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// This machine's order.
+    /// The machine's order.
     pub const NATIVE: Order = if cfg!(target_endian = "big") { Order::Big } else { Order::Little };
 
     fn native<const N: usize>(self, mut bytes: [u8; N]) -> [u8; N] {
@@ -25,7 +25,7 @@ impl Order {
     }
 }
 
-/// How a sample is stored.
+/// Type of a stored sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleType {
     /// Unsigned, 8 bits.
@@ -53,7 +53,7 @@ pub enum SampleType {
 }
 
 impl SampleType {
-    /// Bytes a sample.
+    /// Returns the bytes of a sample.
     pub fn bytes(self) -> usize {
         match self {
             SampleType::U8 | SampleType::I8 => 1,
@@ -63,7 +63,7 @@ impl SampleType {
         }
     }
 
-    /// As in Rust.
+    /// Returns the name of the type, as in Rust.
     pub fn name(self) -> &'static str {
         match self {
             SampleType::U8 => "u8",
@@ -80,7 +80,7 @@ impl SampleType {
         }
     }
 
-    /// `len` samples able to hold this type: codes for up to 16 bits, f32 for more.
+    /// Returns `len` samples that can hold this type: codes for up to 16 bits, f32 for more.
     pub(super) fn blank(self, len: usize) -> Samples {
         let coded = |zero| Samples::Coded { codes: vec![0; len], zero, scale: 1.0 };
         match self {

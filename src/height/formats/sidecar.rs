@@ -45,7 +45,7 @@ pub(super) fn settle(input: &Input, options: &Options, raster: &mut Decoded) {
     settle_heights(raster, options, &crs, band.unit.as_deref());
 }
 
-/// The transformation of a world file, where the format has no position of its own.
+/// Returns the transformation of a world file, if the format has no position of its own.
 fn world(input: &Input, raster: &mut Decoded) -> Option<Affine> {
     if raster.place.is_some() {
         return None;
@@ -59,7 +59,7 @@ fn world(input: &Input, raster: &mut Decoded) -> Option<Affine> {
     }
 }
 
-/// The system of the `.prj` beside a file that names none.
+/// Returns the system of the `.prj` beside a file that names none.
 fn projection(input: &Input, raster: &mut Decoded) -> Option<Crs> {
     if raster.place.is_some() {
         return None;
@@ -98,7 +98,7 @@ fn lay(raster: &mut Decoded, affine: Affine, crs: &Crs) {
     });
 }
 
-/// Settles metres a unit of height: by the band, else by the vertical system, else metres with a warning where the
+/// Sets metres per unit of height: from the band, else from the vertical system. Else it is metres, with a warning if the
 /// horizontal unit makes another one likely.
 fn settle_heights(raster: &mut Decoded, options: &Options, crs: &Crs, band_unit: Option<&str>) {
     let by_band = band_unit.and_then(units::named_length);

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::height::{Error, Holes, Samples};
 
-/// How a colour means a height.
+/// Encoding of heights in colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// R · 256 + G + B / 256 − 32768 metres.
@@ -34,7 +34,7 @@ impl FromStr for Encoding {
 }
 
 impl Encoding {
-    /// Metres a value counts.
+    /// Returns metres per unit of a value.
     pub(super) fn step(self) -> f64 {
         match self {
             Encoding::Terrarium => 1.0,
@@ -42,7 +42,7 @@ impl Encoding {
         }
     }
 
-    /// As in `sample_type`.
+    /// Returns the name of the sample type.
     pub(super) fn name(self) -> &'static str {
         match self {
             Encoding::Terrarium => "terrarium rgb",
@@ -50,7 +50,7 @@ impl Encoding {
         }
     }
 
-    /// The value of a colour, as a number of 24 bits, in steps of [`Self::step`]; exact.
+    /// Returns the exact value of a colour, given as a number of 24 bits, in steps of [`Self::step`].
     pub(super) fn value(self, number: i32) -> f32 {
         match self {
             Encoding::Terrarium => (number - (32768 << 8)) as f32 / 256.0,
@@ -69,7 +69,7 @@ impl Encoding {
     }
 }
 
-/// The encoding asked for, or an error that tells how to ask.
+/// Returns the requested encoding, or an error that names the option.
 pub(super) fn asked(name: &str, options: &Options) -> Result<Encoding, Error> {
     let what = "found a colour picture, which could mean several things: give --encoding terrarium|mapbox";
     options.encoding.ok_or_else(|| Error::new(name, "content", what))
@@ -94,7 +94,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     Ok(raster)
 }
 
-/// Reads a tile.
+/// Decodes the picture of a tile.
 pub(super) fn decode_bytes(name: &str, bytes: &[u8], options: &Options) -> Result<RgbaImage, Error> {
     decode(name, Cursor::new(bytes), options)
 }
@@ -111,7 +111,7 @@ fn decode(name: &str, reader: impl input::ReadSeek, options: &Options) -> Result
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|e| error(&e))?;
     let (w, h) = decoder.dimensions();
-    // Servers send a picture of one pixel where there is nothing.
+    // Servers send a picture of one pixel for absent tiles.
     input::samples(name, [w, h].map(|n| u64::from(n.max(2))), options)?;
     match decoder.color_type() {
         ColorType::Rgb8 | ColorType::Rgba8 | ColorType::L8 | ColorType::La8 => (),

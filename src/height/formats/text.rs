@@ -1,20 +1,20 @@
-//! Words of a text file, read as they come.
+//! Words of a text file, read one after the other.
 
 use std::io;
 
 use super::input::Input;
 use crate::height::Error;
 
-/// Words longer than this are no numbers or keys.
+/// Most bytes of a word; no number or key is longer.
 const WORD_BYTES: usize = 256;
 
-/// A text without the mark of UTF-8 that some programs begin it with.
+/// Returns a text without its UTF-8 byte order mark.
 pub(super) fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
-/// The number that a word stands for, NaN for words that mean "none": a comma may stand for the decimal point, and
-/// C runtimes write `1.#QNAN`, `-1.#IND` and `-nan(ind)`.
+/// Parses a number; words for "no data" become NaN. A comma may stand for the decimal point, and C runtimes write
+/// `1.#QNAN`, `-1.#IND` and `-nan(ind)`.
 pub(super) fn number(word: &str) -> Option<f64> {
     if let Ok(number) = word.parse() {
         return Some(number);
@@ -31,7 +31,7 @@ pub(super) fn number(word: &str) -> Option<f64> {
 /// Words that mean "no data", lower case.
 const NONE: [&str; 5] = ["null", "none", "na", "n/a", "nodata"];
 
-/// Words between white space, with the line they stand in.
+/// A reader of words between white space that counts lines.
 pub(super) struct Words {
     /// Line of the last word, from 1.
     pub line: u64,
@@ -41,12 +41,12 @@ pub(super) struct Words {
 }
 
 impl Words {
-    /// At the beginning.
+    /// Starts before the first word.
     pub fn new() -> Self {
         Self { line: 1, word: String::new(), begun: false }
     }
 
-    /// The last word.
+    /// Returns the last word.
     pub fn word(&self) -> &str {
         &self.word
     }

@@ -1,4 +1,4 @@
-//! Which way the rows of a tile directory run, and where its tiles lie, by the descriptions in it.
+//! The grid of a tile directory, from the descriptions in it: the order of rows and the position of tiles.
 
 use std::{collections::BTreeMap, path::Path};
 

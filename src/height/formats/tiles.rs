@@ -29,7 +29,7 @@ struct Tiles {
 
 /// The deepest zoom level: 2^30 tiles a side, so that sample positions fit.
 const MAX_ZOOM: u32 = 30;
-/// The most bytes of one tile.
+/// Most bytes of a tile.
 const TILE_BYTES: u64 = 1 << 26;
 
 /// Reads a folder of tiles; returns false if it has none.
@@ -59,7 +59,7 @@ fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Decoded, Error> 
             continue;
         }
         let picture = terrain_rgb::decode_bytes(&tile_name, &content, options)?;
-        // Servers answer with a transparent picture of any size where there is nothing.
+        // Servers answer with a transparent picture of any size for absent tiles.
         if picture.pixels().all(|pixel| pixel.0[3] == 0) {
             continue;
         }
@@ -101,7 +101,7 @@ fn no_tiles(name: &str) -> Error {
     Error::new(name, "directory", "expected tiles named zoom/x/y.png, found none")
 }
 
-/// All tiles of a directory, none where it is another kind of folder.
+/// Finds all tiles of a directory; `None` if it is another kind of folder.
 fn scan(path: &Path) -> Result<Option<Tiles>, Error> {
     let mut levels: BTreeMap<(u32, bool), ZoomLevel> = BTreeMap::new();
     let grid = TileGrid::read(path)?;
@@ -141,8 +141,8 @@ fn is_picture(path: &Path) -> bool {
     ["png", "webp", "pngraw"].iter().any(|e| extension.eq_ignore_ascii_case(e))
 }
 
-/// The zoom level asked for, else the highest whose tiles fill their rectangle, else the highest; of both densities the
-/// one with more tiles, else the finer.
+/// Chooses the requested zoom level, else the highest whose tiles fill their rectangle, else the highest. Of both
+/// densities it takes the one with more tiles, else the finer one.
 fn choose(levels: BTreeMap<(u32, bool), ZoomLevel>, name: &str, options: &Options) -> Result<(u32, ZoomLevel), Error> {
     let mut fullest: BTreeMap<u32, ZoomLevel> = BTreeMap::new();
     for ((zoom, _), level) in levels {
@@ -169,7 +169,7 @@ fn bounds(level: &ZoomLevel) -> [u32; 4] {
     level.keys().fold([u32::MAX, u32::MAX, 0, 0], |[w, n, e, s], &[x, y]| [w.min(x), n.min(y), e.max(x), s.max(y)])
 }
 
-/// The encoding asked for, else the one that the directory's name or a description in it names.
+/// Returns the requested encoding, else the one that the directory's name or a description in it names.
 fn encoding(path: &Path, name: &str, grid: &TileGrid, options: &Options) -> Result<Encoding, Error> {
     let absolute = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let descriptions =
@@ -197,14 +197,14 @@ fn named(text: &str) -> Option<Encoding> {
     }
 }
 
-/// The bytes of a small file.
+/// Reads a small file.
 pub(super) fn bytes(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     input::open(path)?.0.take(TILE_BYTES).read_to_end(&mut bytes).map_err(|e| Error::new(name, "file", e))?;
     Ok(bytes)
 }
 
-/// The rectangle being put together.
+/// The rectangle that tiles are copied into.
 struct Mosaic {
     /// Pixels a side of a tile.
     side: u32,

@@ -8,7 +8,7 @@ const RELIEF: f64 = 0.2;
 /// An assumption, and the warning that states it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Assumed {
-    /// Metres a value.
+    /// Metres per unit of a value.
     pub scale: f64,
     /// States what was assumed, and the flags that replace it.
     pub warning: String,
@@ -17,7 +17,7 @@ pub(super) struct Assumed {
 /// Assumes samples 1 m apart, and metres where the values may be metres.
 ///
 /// Unsigned 16-bit values above [`HIGHEST_METRES`] are codes: they get a scale that makes the relief a fifth of the
-/// longer side. `has_scale` tells that the scale is known. Other sample types are measurements, and stay silent
+/// longer side. `has_scale` is true if the scale is stated. Other sample types are measurements, and stay silent
 /// unless they come as a picture.
 pub(super) fn assume(
     format: &str,
@@ -48,7 +48,7 @@ pub(super) fn assume(
     Some(Assumed { scale, warning })
 }
 
-/// The number rounded to three digits, so that the text of it is exact.
+/// Rounds a number to three digits, so that its text is exact.
 fn three_digits(number: f64) -> f64 {
     format!("{number:.2e}").parse().unwrap_or(number)
 }

@@ -1,4 +1,4 @@
-//! USGS DEM: text in records of 1024 bytes; profiles that run north, from west to east, each as long as the land.
+//! USGS DEM: text in records of 1024 bytes; profiles that run north, from west to east, of different lengths.
 //!
 //! Record A describes the grid, a record B with its continuations is a profile. Fields are as in "Standards for
 //! Digital Elevation Models", part 2 (1998); files from before 1988 end record A after the profile count.
@@ -13,7 +13,7 @@ use crate::height::{
 
 /// Bytes of a record.
 const RECORD: usize = 1024;
-/// Where the elevations begin in a profile's first record.
+/// Byte position of the elevations in a profile's first record.
 const ELEVATIONS: usize = 144;
 /// Elevations, of 6 bytes each, in a profile's first record and in its continuations.
 const IN_FIRST: usize = 146;
@@ -21,7 +21,7 @@ const IN_NEXT: usize = 170;
 /// The elevation of a void.
 const VOID: i32 = -32767;
 
-/// Whether a file begins with a record A.
+/// Returns true if a file begins with a record A.
 pub(super) fn is_header(head: &[u8]) -> bool {
     Header::parse(head).is_some()
 }
@@ -141,7 +141,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
         low[1] = low[1].min((south / header.step[1]).floor());
         high[1] = high[1].max((north / header.step[1]).ceil());
     }
-    // Whole numbers beyond this are not exact; no grid on Earth comes near.
+    // Larger steps are no longer exact; no grid on Earth has them.
     if low.iter().chain(&high).any(|at| !(-1e12..=1e12).contains(at)) {
         return Err(input.error("profiles", format!("expected coordinates of a grid, found {low:?} to {high:?} steps")));
     }

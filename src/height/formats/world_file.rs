@@ -1,18 +1,19 @@
-//! World files: six numbers beside a picture that say where its samples lie.
+//! World files: six numbers in a file beside a picture that place its samples.
 
 use super::input::Input;
 use crate::height::georef::affine::Affine;
 
-/// The transformation of the world file beside a input.
+/// Reads the transformation of the world file beside a file; `None` if there is none.
 ///
-/// It is an error text if there is one that does not hold six numbers.
+/// # Errors
+/// A warning text, if the world file does not hold six numbers.
 pub(super) fn beside(input: &Input) -> Option<Result<Affine, String>> {
     let extensions = extensions(input.name);
     let (extension, text) = extensions.iter().find_map(|e| Some((e, input.sibling_text(e)?)))?;
     Some(parse(&text).ok_or_else(|| format!(".{extension}: expected six numbers a line each, found others; ignored")))
 }
 
-/// Extensions of world files of a file name: for `a.tif` these are `tfw`, `tifw` and `wld`.
+/// Returns the extensions of world files of a file name: for `a.tif` these are `tfw`, `tifw` and `wld`.
 fn extensions(name: &str) -> Vec<String> {
     let extension = name.rsplit(['/', '\\']).next().and_then(|file| Some(file.rsplit_once('.')?.1.to_lowercase()));
     let mut names = Vec::new();
@@ -24,7 +25,7 @@ fn extensions(name: &str) -> Vec<String> {
     names
 }
 
-/// Lines: x of a column, y of a column, x of a row, y of a row, then the centre of the first sample.
+/// Parses six lines: x of a column, y of a column, x of a row, y of a row, then the centre of the first sample.
 fn parse(text: &str) -> Option<Affine> {
     let number = |word: &str| word.replace(',', ".").parse::<f64>().ok().filter(|n| n.is_finite());
     let numbers: Vec<f64> = text.split_whitespace().map(number).collect::<Option<_>>()?;

@@ -1,4 +1,4 @@
-//! Where samples lie: coordinates of a file turned into metres.
+//! Georeferencing: a file's coordinates turned into metres.
 
 pub(super) mod affine;
 pub(super) mod crs;
@@ -27,7 +27,7 @@ impl Ellipsoid {
     /// The ellipsoid of GPS.
     pub const WGS84: Self = Self { a: 6_378_137.0, f: 1.0 / 298.257_223_563 };
 
-    /// An ellipsoid, if the numbers describe one.
+    /// Returns the ellipsoid, or `None` if the numbers describe none.
     pub fn new(a: f64, f: f64) -> Option<Self> {
         (a.is_finite() && a > 0.0 && (0.0..0.5).contains(&f)).then_some(Self { a, f })
     }
@@ -61,7 +61,7 @@ pub fn mercator_latitude(y: f64) -> f64 {
 /// Half the side of the web Mercator square, metres.
 pub const MERCATOR_HALF: f64 = MERCATOR_RADIUS * TAU / 2.0;
 
-/// What a coordinate counts.
+/// Unit of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unit {
     /// Longitude and latitude.
@@ -71,7 +71,7 @@ pub enum Unit {
         /// The body that they lie on.
         ellipsoid: Ellipsoid,
     },
-    /// Projected lengths, in so many metres each.
+    /// Projected lengths; metres per unit.
     Metres(f64),
     /// Web Mercator metres, which are 1 / cos φ times too long on the ground.
     Mercator,
@@ -85,7 +85,7 @@ impl Unit {
 /// Coordinates of the north-west sample (east, north), and steps (east, south).
 pub type Grid = ([f64; 2], [f64; 2]);
 
-/// Where a raster lies, north up.
+/// Position of a raster, north up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
     /// East and north coordinate of the north-west sample.
@@ -128,8 +128,8 @@ impl Place {
         self
     }
 
-    /// A place whose file names no coordinate system: degrees if all of it could be longitude and latitude,
-    /// and a warning that says what was taken.
+    /// Returns the place of a raster whose file names no coordinate system: degrees if all of it could be longitude and
+    /// latitude, else metres. The warning states the assumption.
     pub fn guessed((origin, step): Grid, [w, h]: [u32; 2]) -> (Self, String) {
         let [east, south] = [origin[0] + step[0] * f64::from(w), origin[1] - step[1] * f64::from(h)];
         // A grid of someone's own often begins near (0, 0) with steps of metres; a degree is the longest

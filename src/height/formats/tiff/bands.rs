@@ -1,4 +1,4 @@
-//! Bands of a TIFF: which are heights, colours that encode them, or opacity, and how their chunks are read.
+//! Bands of a TIFF: heights, colours that encode heights, and opacity, read chunk by chunk.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -14,7 +14,7 @@ use crate::height::{Error, Holes, Samples};
 pub(super) struct Bands {
     /// One of heights, or three of colours.
     values: Vec<usize>,
-    /// Where it is 0 there is no data.
+    /// The band of opacity; a pixel without opacity has no data.
     alpha: Option<usize>,
     /// The encoding of heights in the colours.
     pub encoding: Option<Encoding>,

@@ -55,7 +55,7 @@ impl Codec {
         }
     }
 
-    /// The most bytes that a byte can become: 128 of 2 in PackBits, 258 of 2 bits in Deflate, a string of all codes of
+    /// Returns the most bytes that a byte can expand to: 128 of 2 in PackBits, 258 of 2 bits in Deflate, a string of all codes of
     /// 12 bits in LZW, a block of 128 KiB of 4 bytes in ZSTD.
     pub fn expansion(self) -> u64 {
         match self {

@@ -72,7 +72,7 @@ fn first_directory(input: &mut Input) -> io::Result<BTreeMap<u16, u64>> {
             3 => 2,
             4 | 13 => 4,
             16 | 18 => 8,
-            // The decoder tells of these on its own, on stderr.
+            // The decoder reports these itself, on stderr.
             2 if count > input.len => {
                 return Err(io::Error::other(format!(
                     "expected a text within the file, found {count} bytes of tag {tag}"

@@ -1,4 +1,4 @@
-//! GeoTIFF tags: where a TIFF's samples lie, and the units of coordinates and heights.
+//! GeoTIFF tags: the position of a TIFF's samples, and the units of coordinates and heights.
 
 use std::io::{Read, Seek};
 
@@ -23,7 +23,7 @@ const VERTICAL_UNITS: u16 = 4099;
 /// The code for "described by further keys".
 const USER_DEFINED: u16 = 32767;
 
-/// Reads position and system; tags that are absent or broken say nothing.
+/// Reads position and system; absent and broken tags are ignored.
 pub(in crate::height::formats) fn read<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     warnings: &mut Vec<String>,
@@ -90,12 +90,12 @@ impl Keys {
         self.doubles.get(usize::from(entry[3])).copied()
     }
 
-    /// A code that names something by itself.
+    /// Returns a key's code, unless it is the code for "user-defined".
     fn registered(&self, key: u16) -> Option<u16> {
         self.code(key).filter(|code| *code != USER_DEFINED && *code != 0)
     }
 
-    /// The unit of a key, or the size that another key gives a unit of the user's own.
+    /// Returns the unit of a key, or the size of a user-defined unit from another key.
     fn unit(&self, key: u16, size: u16, known: fn(u16) -> Option<f64>) -> Option<f64> {
         let size = || self.double(size).filter(|size| size.is_finite() && *size > 0.0);
         self.code(key).and_then(known).or_else(size)
@@ -173,7 +173,7 @@ impl Keys {
         Crs { unit: Some(Unit::Metres(metres.unwrap_or(1.0))), ..named }
     }
 
-    /// The ellipsoid of the user's own axes.
+    /// Returns the ellipsoid of user-defined axes.
     fn ellipsoid(&self) -> Option<Ellipsoid> {
         let a = self.double(SEMI_MAJOR_AXIS)?;
         let by_inverse =

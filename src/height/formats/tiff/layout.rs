@@ -1,4 +1,4 @@
-//! How an image of a TIFF stores its samples: their type, their bands, and the chunks that hold them.
+//! Storage of an image in a TIFF: the type of its samples, its bands, and the chunks that hold them.
 
 use std::io::{Read, Seek};
 

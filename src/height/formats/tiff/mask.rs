@@ -14,7 +14,7 @@ use crate::height::{Error, Holes};
 /// Bits of `NewSubfileType`.
 const IS_REDUCED: u64 = 1;
 const IS_MASK: u64 = 4;
-/// The most directories looked at: a picture, its mask, and overviews of both.
+/// Most directories that are searched: a picture, its mask, and overviews of both.
 const DIRECTORIES: usize = 256;
 
 /// Makes holes where the mask of the first image is 0, if there is one.
