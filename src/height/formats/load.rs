@@ -181,7 +181,10 @@ pub(super) fn gather_file(path: &Path, options: &Options, parts: &mut Parts) -> 
         };
         let data = data(path).ok_or_else(|| no_data(input))?;
         with_input(&data, |input| {
-            parts.add(input.name, options, |options| decode_only_band(input, name, *read, options))
+            parts.add(input.name, options, |options| {
+                one_band(input.name, options)?;
+                decode(input, name, *read, options)
+            })
         })
     })
 }
@@ -206,26 +209,27 @@ fn gather(
 
 /// Reads a file of one raster, and the files beside it.
 pub(super) fn read(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
-    match format.map(|format| (format, &format.read)) {
-        Some((format, Some(Read::Bands(read)))) => decode(input, format.name, *read, options),
-        Some((format, Some(Read::One(read)))) => decode_only_band(input, format.name, *read, options),
-        Some((_, Some(Read::Beside { .. }))) => Err(no_data(input)),
-        Some((_, Some(Read::Archive(_)))) => {
+    let Some(Format { name, read: Some(Read::Bands(read)), .. }) = format else {
+        one_band(input.name, options)?;
+        return read_only_band(input, format, options);
+    };
+    decode(input, name, *read, options)
+}
+
+fn read_only_band(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
+    let Some(format) = format else { return Err(input.error("content", raw::hint(input.len))) };
+    match &format.read {
+        Some(Read::One(read) | Read::Bands(read)) => decode(input, format.name, *read, options),
+        Some(Read::Beside { .. }) => Err(no_data(input)),
+        Some(Read::Archive(_)) => {
             Err(input.error("content", "expected a height file, found an archive within an archive"))
         }
-        Some((format, Some(Read::Dataset(_)) | None)) => Err(input.error("content", format.refusal())),
-        None => Err(input.error("content", raw::hint(input.len))),
+        Some(Read::Dataset(_)) | None => Err(input.error("content", format.refusal())),
     }
 }
 
 fn no_data(input: &Input) -> Error {
     input.error("data", "expected a data file beside the header, found none")
-}
-
-/// Reads a raster that has one band: another one must not be requested.
-fn decode_only_band(input: &mut Input, name: &'static str, read: Reader, options: &Options) -> Result<Decoded, Error> {
-    one_band(input.name, options)?;
-    decode(input, name, read, options)
 }
 
 /// Reads a raster of the format called `name`, and the files beside it.
