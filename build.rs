@@ -1,25 +1,41 @@
-//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (with the feature `vulkan`); tells the commit.
+//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (feature `vulkan`), and records the commit.
 
 #[cfg(feature = "vulkan")]
-#[path = "src/draw/layout.rs"]
+#[path = "src/draw"]
 #[allow(dead_code)]
-mod layout;
+mod draw {
+    pub mod layout;
+    pub mod shared;
+}
+#[cfg(feature = "vulkan")]
+#[path = "src/lod/clusters"]
+#[allow(dead_code)]
+mod clusters {
+    pub mod layout;
+}
+#[cfg(feature = "vulkan")]
+#[path = "src/plan"]
+#[allow(dead_code)]
+mod plan {
+    mod colour;
+    pub mod constants;
+}
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    tell_commit();
+    record_commit();
     #[cfg(feature = "vulkan")]
     shaders::compile_all();
 }
 
-/// In a clone, makes the commit known to the program as `CUESTA_COMMIT`.
-fn tell_commit() {
+/// Sets `CUESTA_COMMIT` in a clone.
+fn record_commit() {
     let git = |words: &[&str]| {
         let output = std::process::Command::new("git").args(words).output().ok()?;
         let text = String::from_utf8(output.stdout).ok()?;
         output.status.success().then(|| text.trim().to_string())
     };
-    // The log of HEAD grows with every commit and checkout.
+    // The log of HEAD changes with every commit and checkout.
     if let (Some(commit), Some(log)) =
         (git(&["rev-parse", "--short=12", "HEAD"]), git(&["rev-parse", "--git-path", "logs/HEAD"]))
     {
@@ -51,7 +67,9 @@ mod shaders {
 
     pub fn compile_all() {
         println!("cargo:rerun-if-changed=shaders");
-        println!("cargo:rerun-if-changed=src/draw/layout.rs");
+        for source in ["draw/shared", "draw/layout", "lod/clusters/layout", "plan/colour", "plan/constants"] {
+            println!("cargo:rerun-if-changed=src/{source}.rs");
+        }
         let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
         let compiler = Compiler::new().expect("shaderc starts");
         let mut table = String::from("&[\n");
@@ -85,12 +103,16 @@ mod shaders {
     }
 
     fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind, define: Option<&str>) -> Result<Vec<u8>, String> {
-        let source = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let source = read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        // glslang cuts the source in its debug information at any byte, also within a character.
+        if !source.is_ascii() {
+            return Err(format!("{}: expected ASCII", path.display()));
+        }
         let mut options = CompileOptions::new().map_err(|e| e.to_string())?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_6);
         options.set_optimization_level(OptimizationLevel::Performance);
-        // Names of structs and members: the layout test reads them.
+        // Keeps the names of structs and members for the layout test.
         options.set_generate_debug_info();
         options.set_warnings_as_errors();
         if let Some(define) = define {
@@ -98,10 +120,10 @@ mod shaders {
         }
         options.set_include_callback(|name, _, from, _| {
             let content = match name {
-                "layout.glsl" => Ok(super::layout::GLSL.to_string()),
-                _ => {
-                    std::fs::read_to_string(Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}"))
-                }
+                "layout.glsl" => Ok(super::draw::layout::GLSL.to_string()),
+                "clusters.glsl" => Ok(super::clusters::layout::GLSL.to_string()),
+                "constants.glsl" => Ok(super::plan::constants::SceneConstants::glsl()),
+                _ => read(&Path::new("shaders").join(name)).map_err(|e| format!("{from}: {name}: {e}")),
             };
             content.map(|content| ResolvedInclude { resolved_name: format!("shaders/{name}"), content })
         });
@@ -109,5 +131,10 @@ mod shaders {
             .compile_into_spirv(&source, kind, &path.to_string_lossy(), "main", Some(&options))
             .map(|artifact| artifact.as_binary_u8().to_vec())
             .map_err(|e| e.to_string())
+    }
+
+    /// Reads a source as ASCII: glslang cuts debug strings at any byte, and readers of SPIR-V reject half a character.
+    fn read(path: &Path) -> std::io::Result<String> {
+        Ok(std::fs::read_to_string(path)?.replace(|c: char| !c.is_ascii(), "?"))
     }
 }

@@ -19,10 +19,10 @@ const REPEATS: usize = 5;
 /// Lengths of triangles' sides: from a page in one quad to the field's own samples far away.
 const EDGES_PX: [f64; 12] = [400.0, 200.0, 100.0, 60.0, 40.0, 25.0, 15.0, 10.0, 6.0, 4.0, 2.5, 1.9];
 
-/// The same on land so small that the pages in sight are about as many as theirs, 35.
+/// The same on land so small that the visible pages are about as many as theirs, 35.
 const FEW_EDGES_PX: [f64; 3] = [400.0, 100.0, 40.0];
 
-/// A series: mean triangles, mean of the frames' shortest times, seconds, and mean pages in sight; the time of all
+/// A series: mean triangles, mean of the frames' shortest times, seconds, and mean visible pages; the time of all
 /// frames' lookups included.
 fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[View]) -> [f64; 3] {
     let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
@@ -40,7 +40,7 @@ fn series(field: &Arc<Field>, name: &str, settings: &[(&str, String)], views: &[
         });
         sum[1] += times.fold(f64::INFINITY, f64::min);
         sum[0] += list.triangles() as f64;
-        let pages = strips.stats().into_iter().find(|figure| figure.0 == "pages in sight");
+        let pages = strips.stats().into_iter().find(|figure| figure.0 == "visible pages");
         sum[2] += pages.map_or(0.0, |figure| figure.1);
     }
     sum.map(|sum| sum / views.len() as f64)

@@ -1,12 +1,12 @@
 #version 460
-// Which children of each split node are blocks in sight: refine.rs, Split::blocks.
+// Finds the children of each split node that are blocks in view: src/lod/clusters/refine.rs, Split::blocks.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 
 bool is_block(Node node) {
     if (node.level > 0 && find(node) != NONE) return false;
     Square known;
-    return square(node, known) && is_in_sight(node, containment(extent(node, known.range)));
+    return square(node, known) && is_in_view(node, containment(extent(node, known.range)));
 }
 
 void main() {

@@ -1,5 +1,6 @@
 #version 460
-// A command for each seed that occurs; the root as one block if it is not split, or if too many nodes are.
+// Writes a command for each seed that occurs. If the root is not split, or too many nodes are, it draws the root as one
+// block.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 #include "cluster_output.glsl"
@@ -10,25 +11,27 @@ Command of_seed(uint seed, uint first, uint count) {
     return Command(words[range + 1], count, words[range], 0, first);
 }
 
-bool is_root_in_sight() {
+bool is_root_in_view() {
     Node root = Node(tree.root, uvec2(0));
     Square known;
-    return square(root, known) && is_in_sight(root, containment(extent(root, known.range)));
+    return square(root, known) && is_in_view(root, containment(extent(root, known.range)));
 }
 
 void main() {
     if (gl_GlobalInvocationID.x != 0) return;
     tally.overflow = scratch.overflow;
     if (scratch.overflow != 0 || scratch.splits == 0) {
-        bool is_drawn = scratch.overflow != 0 || is_root_in_sight();
+        bool is_drawn = scratch.overflow != 0 || is_root_in_view();
         tally.draws = is_drawn ? 1 : 0;
         commands[0] = of_seed(0, 0, 1);
-        instances[0] = placed(Node(tree.root, uvec2(0)), tree.root);
-        if (tree.skirts == 0) instances[0].cells = 2 * tree.cells;
+        Instance root = placed(Node(tree.root, uvec2(0)), tree.root);
+        if (tree.skirts == 0) root.cells = 2 * tree.cells;
+        else root = with_weights(root, SkirtWeights(0, 0, 0.0));
+        // The root has no coarser level to morph to.
         if (view.metric == DISTANCE) {
-            // It goes nowhere.
-            instances[0].weights = uvec4(BY_DISTANCE * 0x01010101, 0, floatBitsToUint(ranges[tree.root]), floatBitsToUint(view.above_squared));
+            root = with_weights(root, DistanceWeights(0, 0.0, ranges[tree.root], view.above_squared));
         }
+        instances[0] = root;
         return;
     }
     uint draws = 0, first = 0;

@@ -1,7 +1,8 @@
-// What a view says about a node of the quadtree of clusters. The CPU twin is src/lod/clusters/lod_evaluator.rs (and
-// tree.rs and height/bounds.rs below it), name by name and to the bit.
+// Visibility and error of the nodes of the quadtree of clusters. The CPU reference is src/lod/clusters/lod_evaluator.rs,
+// with tree.rs and height/bounds.rs, function by function and to the bit.
 #extension GL_EXT_scalar_block_layout : require
 #include "layout.glsl"
+#include "clusters.glsl"
 
 layout(set = 0, binding = 0, scalar) readonly buffer TreeBlock { ClusterTree tree; uint words[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer ViewBlock { ClusterView view; float ranges[]; };
@@ -13,9 +14,6 @@ const float DEEPEST = 1e10;
 const float MIN_SQUARE = 1e-18;
 const float MIN_ERROR = 1e-12;
 const float WITHOUT_ERROR = 1e30;
-const uint CERTIFIED = 0;
-const uint PAPER = 1;
-const uint DISTANCE = 3;
 
 const int OUTSIDE = 0;
 const int CROSSING = 1;
@@ -33,7 +31,7 @@ Node parent(Node node) {
     return Node(node.level + 1, node.at >> 1);
 }
 
-// Whether there is a node of the same level beyond a side: x first, z first, x last, z last.
+// Finds the node of the same level beyond a side (0 to 3: x first, z first, x last, z last). False outside the field.
 bool beyond(Node node, uint side, out Node other) {
     other = node;
     uint axis = side & 1;
@@ -50,7 +48,7 @@ bool is_partial(Node node) {
     return any(greaterThan((node.at + 1) * side_of(node.level), uvec2(tree.last)));
 }
 
-// height/bounds.rs, Level::touched: the first square and how many.
+// First square and number of squares that an interval touches: height/bounds.rs, Level::touched.
 uvec2 touched(uint side, uint count, uint period, uint first, uint reach) {
     if (period == 0) {
         uint last = min((first + reach - 1) / side, count - 1);
@@ -89,7 +87,7 @@ Square measured(Node node) {
     return all;
 }
 
-// Whether a node has land, and what is known of it then.
+// Error and range of heights of a node. False if it has no terrain.
 bool square(Node node, out Square known) {
     if (any(greaterThanEqual(node.at * side_of(node.level), uvec2(tree.last)))) return false;
     known = measured(node);
@@ -97,10 +95,10 @@ bool square(Node node, out Square known) {
 }
 
 vec3 corner(uvec2 at, float height) {
-    precise vec2 metres = vec2(ivec2(at) - view.render_origin) * view.spacing;
-    precise vec2 moved = metres + view.render_origin_relative;
-    precise float above = height - view.render_origin_height;
-    precise float y = above + view.render_origin_height_relative;
+    precise vec2 metres = vec2(ivec2(at) - view.origin.at) * view.spacing;
+    precise vec2 moved = metres + view.origin.relative;
+    precise float above = height - view.origin.height;
+    precise float y = above + view.origin.height_relative;
     return min(max(vec3(moved.x, y, moved.y), -FARTHEST), FARTHEST);
 }
 
@@ -173,7 +171,7 @@ float farthest_aside(Extent extent) {
     return root(max(square, MIN_SQUARE));
 }
 
-// What a tolerance that makes this scale allows over an error.
+// Allowed error over an error, for a tolerance with this scale.
 float allowed_over(float scale, Extent extent, float error) {
     if (error == 0.0) return WITHOUT_ERROR;
     float distance = max(distance_of(extent), view.near);
@@ -220,8 +218,8 @@ float error_margin(uint level, Extent extent, float error) {
     return allowed_over(view.scale, extent, error);
 }
 
-// Whether any of the finest blocks in a node that lies to what can be seen as `found` says may be seen.
-bool is_in_sight(Node node, int found) {
+// True if any of the finest blocks in a node may be in view. `found`: containment of the node in the frustum.
+bool is_in_view(Node node, int found) {
     if (found != CROSSING || node.level == 0) return found != OUTSIDE;
     uint top = node.level;
     Node at = child(node, 0);
@@ -233,7 +231,7 @@ bool is_in_sight(Node node, int found) {
             at = child(at, 0);
             continue;
         }
-        // The next one: beside it, or beside what it is the last in.
+        // The next node in depth-first order.
         while ((at.at.x & at.at.y & 1) == 1) {
             at = parent(at);
             if (at.level == top) return false;

@@ -1,5 +1,5 @@
 #version 460
-// The children of the split nodes of the level above `argument`, or the root: src/lod/clusters/refine.rs, descend.
+// Tests the children of the split nodes of the level above `argument`, or the root: src/lod/clusters/refine.rs, descend.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 
@@ -19,7 +19,7 @@ void main() {
         refine(child(node_at(place_in_level(argument + 1, k / 4)), k & 3));
         return;
     }
-    // The first program to run: indirect dispatches are one group high and deep.
+    // The first dispatch also sets the other two sizes of indirect dispatches to 1.
     if (k <= tree.root) {
         work[row(k) + CHILDREN + 1] = 1;
         work[row(k) + CHILDREN + 2] = 1;

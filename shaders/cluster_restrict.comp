@@ -1,5 +1,6 @@
 #version 460
-// Coarser neighbours of the split nodes of level `argument` are kept within a level of them: refine.rs, restrict.
+// Splits coarser neighbours of the split nodes of level `argument`, so that neighbours differ by at most one level:
+// src/lod/clusters/refine.rs, restrict.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 

@@ -1,11 +1,11 @@
-// Where blocks have skirts, and how deep: src/lod/clusters/skirts.rs, name by name and to the bit.
+// Sides with skirts and their depth. The CPU reference is src/lod/clusters/skirts.rs, function by function and to the bit.
 
 const float UP = 1.0 + 1.0 / 8388608.0;
 const float ROUNDING = 8.0 / 8388608.0;
 
 struct Edge { uint level; uint weight; float error_m; };
 
-// tree.rs, deviation: of what is known of a node, its error and how far its samples are apart.
+// Error and height range of a node, metres, rounded up: tree.rs, deviation.
 vec2 deviation(Square known) {
     precise float height = known.range.y - known.range.x;
     precise float apart = height * UP;
@@ -27,7 +27,7 @@ Edge edge(Node block) {
     return Edge(block.level, found, error_m);
 }
 
-// What is drawn at a node, if anything is: it, its parent or the blocks in it.
+// Edge of the mesh that is drawn at a node: of the node, its parent or the blocks in it. False if nothing is drawn.
 bool edge_at(Node node, out Edge found) {
     found = Edge(0, 0, 0.0);
     if (node.level == tree.root) return false;
@@ -51,7 +51,8 @@ bool edge_at(Node node, out Edge found) {
     return true;
 }
 
-// The most, metres, that a block can be apart from what is drawn beyond a side; negative if it is not at all.
+// Bound of the gap between a block and its neighbour beyond a side, plus a margin for the rasteriser, metres. Negative
+// if there is no gap.
 float gap_m(Node block, uint side) {
     Node other;
     Edge theirs;
@@ -68,21 +69,21 @@ float gap_m(Node block, uint side) {
     return rounded;
 }
 
-void hang_skirts(Node node, uint state) {
-    float depth = 0.0;
+SkirtWeights hanging_skirts(Node node, uint state) {
+    SkirtWeights weights = SkirtWeights(0, 0, 0.0);
     for (uint quadrant = 0; quadrant < 4; ++quadrant) {
         uint holds = state_at(state, quadrant);
         for (uint k = 0; k < (holds == BLOCK ? 1 : holds == FOUR_BLOCKS ? 4 : 0); ++k) {
             Node block = child(node, quadrant);
             if (holds == FOUR_BLOCKS) block = child(block, k);
-            set(0, quadrant, edge(block).weight | (holds == FOUR_BLOCKS ? FINER : 0));
+            weights.inside |= (edge(block).weight | (holds == FOUR_BLOCKS ? FINER : 0)) << (8 * quadrant);
             for (uint side = 0; side < 4; ++side) {
                 float gap = gap_m(block, side);
                 if (gap < 0.0) continue;
-                weights[1] |= 1u << (4 * quadrant + side);
-                depth = max(depth, gap);
+                weights.sides |= 1u << (4 * quadrant + side);
+                weights.depth_m = max(weights.depth_m, gap);
             }
         }
     }
-    weights[2] = floatBitsToUint(depth);
+    return weights;
 }

@@ -1,11 +1,11 @@
-// The split nodes of a view, in a table that many invocations fill: what they share, and how they are found again.
+// Hash table of the split nodes of a view (open addressing, linear probing), which all invocations fill.
 // Ids are those of `Node::id` in src/lod/clusters/tree.rs.
 #include "cluster_lod.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 2, scalar) coherent buffer ScratchBlock { ClusterScratch scratch; uint work[]; };
-// Which level, where a program runs level by level.
+// The level, in programs that run level by level.
 layout(push_constant, scalar) uniform ArgumentBlock { uint argument; };
 
 const uint NONE = 0xffffffff;
@@ -35,7 +35,7 @@ uint first_place(uint id) {
     return ((id * 0x9e3779b1u) >> 7) & (tree.places - 1);
 }
 
-// Where a split node stands in the table; NONE: it is not split.
+// Place of a split node in the table; NONE if the node is not split.
 uint find(Node node) {
     if (any(notEqual(node.at >> (tree.root - node.level), uvec2(0)))) return NONE;
     uint id = node_id(node);
@@ -49,7 +49,7 @@ uint find(Node node) {
     return NONE;
 }
 
-// Enters a split node, if it is not there, and takes the lesser ratio.
+// Enters a split node if it is missing, and keeps the smaller error margin.
 void enter(Node node, float error_margin) {
     uint id = node_id(node);
     uint place = first_place(id);
@@ -75,13 +75,13 @@ void enter(Node node, float error_margin) {
     scratch.overflow = 1;
 }
 
-// Whether a node has land, in sight if that matters.
+// True if a node has terrain, and is in view if the selection culls.
 bool draws(Node node) {
     Square known;
     return square(node, known) && (view.culls == 0 || containment(extent(node, known.range)) != OUTSIDE);
 }
 
-// The k-th split node of a level: its place.
+// Place of the k-th split node of a level.
 uint place_in_level(uint level, uint k) {
     return work[words[tree.levels + 5 * level + 3] + k];
 }

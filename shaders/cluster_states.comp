@@ -1,5 +1,5 @@
 #version 460
-// What each split node draws, and its number among those of its seed: collapse.rs, state.
+// Finds the state of each split node, and its rank among those with its seed: src/lod/clusters/collapse.rs, state.
 #extension GL_GOOGLE_include_directive : require
 #include "cluster_splits.glsl"
 #include "cluster_output.glsl"
@@ -18,7 +18,7 @@ void main() {
     Node node = node_at(place);
     uint blocks = work[tree.blocks + place];
     uint state = 0;
-    // Four blocks are left to the parent.
+    // The parent draws four blocks.
     if (blocks != ALL || node.level == tree.root) {
         for (uint quadrant = 4; quadrant-- > 0;) state = 3 * state + quadrant_state(node, blocks, quadrant);
     }

@@ -1,11 +1,8 @@
-// How far blocks have gone over into their parents: src/lod/clusters/refine.rs, and src/draw/weights.rs.
+// Morph weights of blocks towards their parents: src/lod/clusters/refine.rs.
 
-const uint ONE = 64;
-const uint FINER = 128;
-const uint STITCHED = 128;
-const uint BY_DISTANCE = 96;
+#include "weights.glsl"
 
-// Whether a node is split, and how far the blocks in it have gone over into it: refine.rs, weight.
+// Weight with which the blocks in a node have morphed to it. False if the node is not split.
 bool weight(Node node, out uint found) {
     found = 0;
     uint place = find(node);
@@ -20,12 +17,6 @@ uint weight_or_none(Node node) {
     uint found;
     weight(node, found);
     return found;
-}
-
-uvec4 weights;
-
-void set(uint word, uint at, uint value) {
-    weights[word] |= value << (8 * at);
 }
 
 uint state_at(uint state, uint quadrant) {

@@ -1,51 +1,49 @@
-// The ground from near: four materials that repeat (src/texture/detail.rs), by slope and height.
+// Detail textures: four repeating materials (src/texture/detail.rs), mixed by slope and height.
 
-// Layers: grass, rock, scree, snow. A texel: brightness, hue, slopes along its two axes, all around a half.
+// Layers: grass, rock, scree, snow. Texels: brightness, hue and the slopes along both axes, with mean 0.5.
 layout(set = 0, binding = 4) uniform sampler2DArray materials;
-layout(constant_id = 9) const bool DETAIL = false;
 
 const uint GRASS = 0, ROCK = 1, SCREE = 2, SNOW = 3;
-// A material's colours at both ends of its hue.
+// Colours of each material at both ends of its hue.
 const vec3 HUES[4][2] = {
     { vec3(0.052, 0.088, 0.024), vec3(0.205, 0.195, 0.085) },
     { vec3(0.170, 0.160, 0.155), vec3(0.360, 0.320, 0.275) },
     { vec3(0.270, 0.220, 0.165), vec3(0.470, 0.415, 0.345) },
     { vec3(0.560, 0.640, 0.770), vec3(0.780, 0.810, 0.850) },
 };
-// How much its brightness and its slopes tell.
+// Strength of each material's brightness and slopes.
 const vec2 STRENGTHS[4] = { vec2(2.2, 1.2), vec2(1.8, 1.5), vec2(1.6, 1.4), vec2(0.5, 0.7) };
-// Ground and grain: repetitions within that of the frame, powers of two so that both repeat with it, and parts.
+// Coarse and fine octave: repetitions per period of the frame (powers of two), and their shares.
 const float SCALES[2] = { 128.0, 1024.0 };
 const float PARTS[2] = { 0.55, 0.6 };
-// Texels along a side, as a power of two.
+// Texels along a side as a power of two.
 const float SIDE = 9.0;
 
-// A place in the repetition: x, height, z; how much of it a pixel covers, as a power of two; and a number that changes
-// slowly from place to place.
+// Position in the period (x, height, z), mip level of the pixel's footprint, and a slowly varying noise.
 struct Spot { vec3 at; float lod; float patches; };
 
 struct Material { vec3 albedo; vec2 slope; };
 
-// `pixel`: metres across the line of sight; `facing`: its cosine with the normal. Land seen from aside is drawn out over
-// several pixels: it is blurred less than along its length, which is as far as one look goes.
+// `pixel`: size of a pixel across the viewing ray, metres. `facing`: cosine between the ray and the normal. At grazing
+// angles the footprint is long; the mip level is a compromise between its width and its length.
 Spot spot_at(vec2 lattice, float height, float pixel, float facing) {
-    vec2 plan = (lattice + frame.detail_first) * frame.detail_scale;
-    float per_metre = frame.detail_scale.x / frame.spacing.x;
+    vec2 plan = (lattice + frame.textures.detail_first) * frame.textures.detail_scale;
+    float per_metre = frame.textures.detail_scale.x / frame.heights.spacing.x;
     float across = pixel * clamp(0.4 / max(facing, 1e-3), 1.0, 8.0);
     return Spot(vec3(plan.x, height * per_metre, plan.y), log2(max(across * per_metre, 1e-9)) + SIDE, 0.0);
 }
 
-// What a texel has more or less than the mean.
+// Difference of a texel from the mean.
 vec4 material_texel(uint layer, vec2 at, float lod, float scale) {
     return textureLod(materials, vec3(at * scale, layer), lod + log2(scale)) - 128.0 / 255.0;
 }
 
-// One of many places in the square, far from those of the numbers around (Roberts 2018).
+// Quasirandom offset in the unit square, far from the offsets of nearby numbers (Roberts 2018, R2 sequence).
 vec2 elsewhere(float number) {
     return fract(vec2(0.7548776662, 0.5698402910) * number);
 }
 
-// A material on the plane of two axes. The ground is looked up where the patch says, so that no eye finds its square.
+// A material projected along an axis. The coarse octave mixes two offsets by the patch noise, which hides the repetition.
 Material material_at(uint layer, vec2 at, Spot spot) {
     float patches = 6.0 * spot.patches;
     float first = floor(patches);
@@ -61,8 +59,7 @@ Material material_at(uint layer, vec2 at, Spot spot) {
     return Material(brightness * hue, STRENGTHS[layer].y * 255.0 / 64.0 * found.ba);
 }
 
-// A material seen from the sides that the ground faces: from above alone it would be drawn out on cliffs. What stands out
-// of it is taken off the normal.
+// Triplanar mapping of a material, so that it is not stretched on cliffs. Its slopes bend the normal.
 vec3 material_albedo(uint layer, Spot spot, vec3 facing, float weight, inout vec3 normal) {
     vec3 sides = facing * facing;
     sides *= sides;
@@ -88,7 +85,7 @@ vec3 material_albedo(uint layer, Spot spot, vec3 facing, float weight, inout vec
     return weight * albedo;
 }
 
-// How much of each material is at a height (0 to 1) on ground that faces so: they add up to 1. `patches` is around 0.
+// Shares of the materials at a height (0 to 1) and a normal whose y is `facing`; their sum is 1. `patches`: noise of mean 0.
 vec4 shares(float height, float facing, float patches) {
     float rock = smoothstep(0.82, 0.64, facing + 0.5 * patches);
     float scree = smoothstep(0.92, 0.80, facing + 0.5 * patches) + smoothstep(0.45, 0.65, height + 0.6 * patches);
@@ -99,7 +96,7 @@ vec4 shares(float height, float facing, float patches) {
     return all / (all.x + all.y + all.z + all.w);
 }
 
-// Albedo of the ground at a height (0 to 1), and its normal with what stands out of it.
+// Albedo of the ground at a height (0 to 1). Bends the normal by the materials' slopes.
 vec3 ground_albedo(Spot spot, float height, inout vec3 normal) {
     float wide = material_texel(ROCK, spot.at.xz, spot.lod, 1.0).g;
     float narrow =
@@ -112,6 +109,6 @@ vec3 ground_albedo(Spot spot, float height, inout vec3 normal) {
         if (share[layer] > 0.0) albedo += material_albedo(layer, spot, facing, share[layer], normal);
     }
     normal = normalize(normal);
-    // Wide patches, lighter and darker.
+    // Wide lighter and darker patches.
     return albedo * (1.0 + (0.8 * wide + 0.4 * narrow) * (1.0 - share[SNOW]));
 }

@@ -1,4 +1,4 @@
-// From a placed vertex to the rasteriser, the same for every source; with CAPTURE also to a buffer.
+// Outputs of the vertex shader for all sources. With CAPTURE they are also written to a buffer.
 
 layout(location = 0) out vec3 out_relative;
 layout(location = 1) out vec2 out_lattice;
@@ -15,13 +15,13 @@ void capture(ivec2 at, float height) {
 }
 #endif
 
-// `at`: in parts of a sample, as the frame says.
+// `at`: lattice position in units of frame.vertices.fraction_bits.
 void emit_vertex(ivec2 at, float height, uint level, uint batch) {
     out_relative = relative_position(at, height);
-    // Relative to the anchor: exact near the eye, however large the field.
+    // Relative to the render origin: exact near the eye however large the field is.
     out_lattice = from_render_origin(at);
     out_level_batch = uvec2(level, batch);
-    gl_Position = frame.clip_from_relative * vec4(out_relative, 1.0);
+    gl_Position = frame.camera.clip_from_relative * vec4(out_relative, 1.0);
 #ifdef CAPTURE
     capture(at, height);
 #endif

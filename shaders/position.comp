@@ -1,12 +1,12 @@
 #version 460
-// Positions of the vertices of a draw list, for comparison with the CPU twin (src/draw/place.rs).
+// Positions of the vertices of a draw list, for comparison with the CPU reference (src/draw/place.rs).
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "position.glsl"
 
 layout(local_size_x = 64) in;
 
-// A vertex and the instance it is placed by.
+// A vertex and its instance.
 struct Query { ExplicitVertex vertex; VertexNormals normals; Instance instance; uint explicit_height; };
 
 struct Answer { vec3 position; vec3 normal; };
@@ -21,7 +21,7 @@ void main() {
     ExplicitVertex vertex = query.vertex;
     if (query.explicit_height == 0) {
         Placed placed = placed(query.instance, vertex.position);
-        answers[k] = Answer(relative_position(placed.at << frame.fraction_bits, placed.height), vec3(0.0));
+        answers[k] = Answer(relative_position(placed.at << frame.vertices.fraction_bits, placed.height), vec3(0.0));
     } else {
         float height = explicit_height(query.instance, vertex);
         vec3 position = relative_position(explicit_position(query.instance, vertex), height);

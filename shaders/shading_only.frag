@@ -1,5 +1,5 @@
 #version 460
-// The land, where a frame left its depth: the fragment work of that frame without its triangles.
+// Shades the terrain of a depth buffer: the fragment work of a frame without its triangles.
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "position.glsl"
@@ -22,8 +22,8 @@ void main() {
     }
     vec4 point = in_far + depth * in_near;
     vec3 relative = point.xyz / point.w;
-    vec2 lattice = (relative.xz - frame.render_origin_relative) / frame.spacing;
-    // At edges of the land the step is between two surfaces: that costs no more.
+    vec2 lattice = (relative.xz - frame.camera.origin.relative) / frame.heights.spacing;
+    // At silhouettes the derivative spans two surfaces; the cost is the same.
     vec4 steps = vec4(dFdx(lattice), dFdy(lattice));
     out_colour = vec4(terrain_colour(relative, lattice, steps, normal_at(relative, lattice), uvec2(0)), 1.0);
 }

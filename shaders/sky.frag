@@ -7,6 +7,6 @@ layout(location = 0) in vec3 in_direction;
 layout(location = 0) out vec4 out_colour;
 
 void main() {
-    // Alpha 0 says: no land here.
+    // Alpha 0 marks the sky.
     out_colour = vec4(sky(normalize(in_direction)), 0.0);
 }

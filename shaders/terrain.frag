@@ -1,5 +1,5 @@
 #version 460
-// The land, where a triangle was drawn.
+// Shades a fragment of the terrain.
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "position.glsl"
@@ -16,10 +16,10 @@ layout(location = 3) in vec3 in_normal;
 layout(location = 0) out vec4 out_colour;
 
 void main() {
-    // Before anything is discarded: then neighbours still have the position.
+    // Derivatives need all four pixels of a quad, so they come before the discard.
     vec4 steps = vec4(dFdx(in_lattice), dFdy(in_lattice));
     if (is_open(in_lattice)) discard;
-    // Alpha tells a skirt from the surface.
+    // Alpha 0.5 marks skirts.
     bool is_skirt = SKIRTS && (in_level_batch.x & SKIRT) != 0;
 #ifdef NORMALS
     vec3 normal = normalize(in_normal);

@@ -42,8 +42,8 @@ impl DeviceBackend {
     }
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
-        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_requirements(technique.pipeline_requirements()))
+        let plan = ScenePlan::builder(field, &self.look, &self.gpu.device_limits());
+        plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
     }
 
     /// A technique as it is when just made, and its stage.
@@ -65,8 +65,9 @@ impl DeviceBackend {
             self.truths = (name, BTreeMap::new());
         }
         if !self.truths.1.contains_key(&frame) {
-            let plan =
-                ScenePlan::new(scene.field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+            let plan = ScenePlan::builder(scene.field, &self.look, &self.gpu.device_limits())
+                .build()
+                .map_err(anyhow::Error::msg)?;
             let look = self.look.after(frame as f64 * TIME_STEP_S);
             let of_frame = scene::Scene { look: &look, ..self.scene(scene.field, &plan) };
             let truth = Truth::new(&of_frame, &scene.views[frame])?;
@@ -91,7 +92,8 @@ impl BenchBackend for DeviceBackend {
         let device =
             Device { name: candidate.name.clone(), driver: candidate.driver.clone(), is_cpu: candidate.is_software() };
         let plan = |(terrain, field): &(Terrain, Arc<Field>)| {
-            let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+            let plan =
+                ScenePlan::builder(field, &self.look, &self.gpu.device_limits()).build().map_err(anyhow::Error::msg)?;
             let (kept, left_out) = plan.decisions(field, None);
             let [kept, left_out] = [kept, left_out].map(|all| all.into_iter().map(decision).collect());
             Ok(Plan { terrain: terrain.name.clone(), kept, left_out })

@@ -116,9 +116,8 @@ fn plan(
 
     let gpu = super::render::open(common, false)?;
     let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
-    let plan = ScenePlan::new(field, look, &limits).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_overlay(field, look, &limits, picture).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, look, &limits).overlay(picture);
+    let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
     let Some(frames) = args.measure else {
         return Ok((plan, None));
     };
@@ -151,8 +150,8 @@ fn plan(
         bail!("--measure: this build is without Vulkan");
     }
     let device = DeviceLimits { image_side: 16384, image_layers: 2048, filters_heights: true };
-    let plan = ScenePlan::new(field, look, &device).map_err(anyhow::Error::msg)?;
     let picture = overlay.map(|picture| picture.dimensions().into());
-    let plan = plan.with_overlay(field, look, &device, picture).map_err(anyhow::Error::msg)?;
-    Ok((plan.with_requirements(technique.pipeline_requirements()), None))
+    let plan = ScenePlan::builder(field, look, &device).overlay(picture);
+    let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
+    Ok((plan, None))
 }

@@ -83,9 +83,9 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
     let gpu = open(common, false)?;
-    let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
     let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
-    let plan = plan.with_overlay(&field, &look, &gpu.device_limits(), picture).map_err(anyhow::Error::msg)?;
+    let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture).build();
+    let plan = plan.map_err(anyhow::Error::msg)?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     files::make_folder(&args.out)?;
     let spinner = report::spinner(common, "profiling");

@@ -147,10 +147,9 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let mut technique = args.technique.build(common, &field)?;
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
-    let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).map_err(anyhow::Error::msg)?;
     let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
-    let plan = plan.with_overlay(&field, &look, &gpu.device_limits(), picture).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture);
+    let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let rendered = scene.render(technique.as_mut(), &view, args.repeat)?;
     report::save(&args.output, &rendered.picture)?;

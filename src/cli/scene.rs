@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
@@ -120,7 +121,7 @@ pub struct ViewArgs {
 pub struct LookArgs {
     /// What colours say; `overlay` if a picture is given, else `height`.
     #[arg(long, value_enum)]
-    pub colour: Option<ColourArg>,
+    pub colour: Option<Colour>,
     /// A picture laid over the field: where its GeoTIFF tags or its world file say, else over all of the file's samples.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
@@ -174,27 +175,14 @@ impl GroundArgs {
     }
 }
 
-/// [`Colour`] as a word.
-#[derive(ValueEnum, Clone, Copy, Debug)]
-pub enum ColourArg {
-    /// Hypsometric tint.
-    Height,
-    /// Level of detail.
-    Level,
-    /// The overlay picture.
-    Overlay,
-    /// Distance from the samples' surface: blue exact, red one pixel, white more.
-    Error,
-    /// Surface normal.
-    Normal,
-    /// Draw.
-    Batch,
-    /// Level and edges of the overlay's maps (--texture-memory).
-    Maps,
-    /// A ground of 2^36 texels, made where they are seen.
-    Ground,
-    /// Level and edges of the nodes of that ground's map.
-    Nodes,
+impl ValueEnum for Colour {
+    fn value_variants<'a>() -> &'a [Self] {
+        Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.help()))
+    }
 }
 
 /// What [`is_length`] takes.
@@ -315,22 +303,11 @@ impl LookArgs {
         terrain: &str,
         (field, footprint): (&Field, &Footprint),
     ) -> Result<(Look, Option<image::RgbaImage>)> {
-        let colour = match (self.colour, &self.overlay) {
-            (Some(ColourArg::Height), _) => Colour::Height,
-            (Some(ColourArg::Level), _) => Colour::Level,
-            (Some(ColourArg::Error), _) if endless::is_named(terrain) => {
-                bail!("--colour error: {terrain} has no samples to be compared with")
-            }
-            (Some(ColourArg::Error), _) => Colour::Error,
-            (Some(ColourArg::Normal), _) => Colour::Normal,
-            (Some(ColourArg::Batch), _) => Colour::Batch,
-            (Some(ColourArg::Maps), _) => Colour::Maps,
-            (Some(ColourArg::Ground), _) => Colour::Ground,
-            (Some(ColourArg::Nodes), _) => Colour::Nodes,
-            (Some(ColourArg::Overlay), _) | (None, Some(_)) => Colour::Overlay,
-            (None, None) if is_demo(terrain) => Colour::Overlay,
-            (None, None) => Colour::Height,
-        };
+        let has_picture = self.overlay.is_some() || is_demo(terrain);
+        let colour = self.colour.unwrap_or(if has_picture { Colour::Overlay } else { Colour::Height });
+        if colour == Colour::Error && endless::is_named(terrain) {
+            bail!("--colour error: {terrain} has no samples to be compared with");
+        }
         let picture = self.picture(terrain, colour)?;
         let defaults = Look::default();
         let sun = self.sun.unwrap_or(defaults.sun);

@@ -1,4 +1,4 @@
-//! From a draw list to its triangles, on the CPU: what the device draws, without a device.
+//! Expands a draw list to its triangles on the CPU: the reference of the vertex pipeline.
 
 use super::layout::Frame;
 use super::place::{explicit_height, explicit_position, placed};
@@ -18,7 +18,7 @@ pub struct Drawn {
 
 /// Calls `visit` for every triangle of the list that is not degenerate in plan.
 ///
-/// `frame` needs only its placing part ([`Frame::placing`]). Corners' positions have the list's
+/// `frame` needs only camera and heights ([`Frame::placing`]). Corners' positions have the list's
 /// [`fraction_bits`](DrawList::fraction_bits).
 pub fn visit_triangles(
     field: &Field,
@@ -32,14 +32,14 @@ pub fn visit_triangles(
     }
 }
 
-/// All triangles of the list.
+/// Returns all triangles of the list that are not degenerate in plan.
 pub fn triangles(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawList) -> Vec<Drawn> {
     let mut drawn = Vec::new();
     visit_triangles(field, frame, resident, list, |t| drawn.push(*t));
     drawn
 }
 
-/// Calls `visit` for every triangle of one draw, or part of a draw, of the list that is not degenerate in plan.
+/// Calls `visit` for every triangle of one draw of the list that is not degenerate in plan.
 pub fn visit_draw(
     field: &Field,
     frame: &Frame,
@@ -55,7 +55,7 @@ pub fn visit_draw(
     });
 }
 
-/// The triangles of the list's skirts: upright, no part of the surface. They face away from what they hang from.
+/// Returns the triangles of the list's skirts: vertical walls that are no part of the surface and face outwards.
 pub fn skirts(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawList) -> Vec<Drawn> {
     let mut skirts = Vec::new();
     let is_skirted = |draw: &&Draw| list.instances[draw.instances.start as usize..].first().is_some_and(is_skirted);
@@ -65,7 +65,7 @@ pub fn skirts(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawList
     skirts
 }
 
-/// Whether a triangle without area in plan has one in space. No surface has such triangles.
+/// Returns true if a triangle has area in space but none in plan. No surface has such triangles.
 pub fn is_upright(drawn: &Drawn) -> bool {
     let [a, b, c] = drawn.corners;
     doubled_area(&drawn.corners) == 0 && a != b && b != c && c != a
@@ -80,7 +80,7 @@ fn each_triangle(
     mut visit: impl FnMut(Drawn),
 ) {
     let geometry = geometry(draw.source, resident, list);
-    let frame = &Frame { fraction_bits: list.fraction_bits as i32, ..*frame };
+    let frame = &frame.with_fractions(list.fraction_bits);
     let placed = |instance: u32| &list.instances[instance as usize];
     let corner = |instance, index| {
         let corner = corner(field, frame, geometry, draw.source, placed(instance), index);
@@ -89,8 +89,9 @@ fn each_triangle(
     assemble(geometry, draw, corner, |instance, corners| visit(Drawn { corners, instance }));
 }
 
-/// Calls `visit` for every triangle of one draw: its instance, and its corners as `corner` tells them by instance and
-/// index (the draw's first vertex added), in the order of its winding. `geometry` is what the draw's indices address ([`geometry`]).
+/// Calls `visit` with the instance and the corners of every triangle of one draw, in the order of its winding. `corner`
+/// returns a corner from the instance and the index, the draw's first vertex included. `geometry` holds the draw's
+/// indices: see [`geometry`].
 pub fn assemble<T>(
     geometry: &Geometry,
     draw: &Draw,
@@ -116,7 +117,7 @@ pub fn assemble<T>(
     }
 }
 
-/// What a source's indices address.
+/// The geometry that a source's indices address.
 pub fn geometry<'a>(source: Source, resident: &'a Geometry, list: &'a DrawList) -> &'a Geometry {
     if source == Source::Streamed { &list.streamed } else { resident }
 }
@@ -132,7 +133,7 @@ fn corner(
     match source {
         Source::Lattice => {
             let placed = placed(field, frame, instance, geometry.lattice[index as usize].position);
-            let [x, z] = placed.at.map(|n| n << frame.fraction_bits);
+            let [x, z] = placed.at.map(|n| n << frame.vertices.fraction_bits);
             Corner { x, z, y: placed.height }
         }
         Source::Resident | Source::Streamed => {

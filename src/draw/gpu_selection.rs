@@ -1,8 +1,8 @@
-//! How a device finds draws and instances by itself: tables, programs and their order, as plain data.
+//! Selection by compute shaders, as plain data: tables, programs and the order in which they run.
 //!
-//! The programs read the resident table and the frame's [`parameters`](super::DrawList::parameters), work in a scratch
-//! of their own, and write [`Instance`](super::Instance)s, a [`Tally`](super::layout::Tally) and indexed indirect
-//! commands: storage buffers at bindings 0 to 4 of set 0, in this order.
+//! The programs read a resident table and the frame's [`parameters`](super::DrawList::parameters), and work in a scratch
+//! buffer. They write [`Instance`](super::Instance)s, a [`Tally`](super::layout::Tally) and indexed indirect commands.
+//! Table, parameters, scratch, instances and commands are storage buffers at bindings 0 to 4 of set 0.
 
 use std::ops::Range;
 
@@ -11,50 +11,50 @@ use std::ops::Range;
 pub struct GpuSelection {
     /// File names of the compute programs.
     pub programs: &'static [&'static str],
-    /// What stays in device-local memory: words.
+    /// Words of the table, which stays in device-local memory.
     pub table: Vec<u32>,
-    /// Words of parameters a frame.
+    /// Number of words of parameters a frame.
     pub parameters: usize,
-    /// Words of scratch.
+    /// Number of words of scratch.
     pub scratch: usize,
-    /// What is done each frame, in order; each step sees all that those before it wrote.
+    /// Steps of a frame, in order. Each step sees everything that earlier ones wrote.
     pub steps: Vec<Step>,
-    /// The most commands it writes.
+    /// Maximum number of commands.
     pub draws: usize,
-    /// The most instances it writes.
+    /// Maximum number of instances.
     pub instances: usize,
 }
 
-/// One step.
+/// One step of a selection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Words of the scratch take this value.
+    /// Sets words of the scratch to a value.
     Fill(Range<usize>, u32),
-    /// A program runs; it is pushed the argument, one word.
+    /// Runs a program with one word of push constants.
     Run {
-        /// Its number.
+        /// Index into the programs.
         program: usize,
-        /// In how many groups.
+        /// Number of workgroups.
         groups: Groups,
-        /// What it is pushed.
+        /// Push constant.
         argument: u32,
     },
 }
 
-/// How many groups of a program run.
+/// Number of workgroups of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Groups {
     /// One.
     One,
-    /// As three words of the scratch say, from this one on.
+    /// An indirect dispatch whose size is three words of the scratch, from this one on.
     Counted(usize),
 }
 
-/// Bytes that every device lets a program address at once (`maxStorageBufferRange`).
+/// Size of a storage buffer that every device supports (the required `maxStorageBufferRange`), bytes.
 pub const MAX_BYTES: usize = 1 << 27;
 
 impl GpuSelection {
-    /// Whether its buffers are such that every device lets programs address them.
+    /// Returns true if every device can bind its buffers.
     pub fn fits(&self) -> bool {
         let instances = self.instances * size_of::<super::Instance>();
         [4 * self.table.len(), 4 * self.scratch, instances].iter().all(|&bytes| bytes <= MAX_BYTES)

@@ -1,4 +1,4 @@
-//! The neck: what is to be drawn, as plain data. It knows neither who chose it nor who draws it.
+//! The draw list of a frame, as plain data. It depends neither on the techniques that fill it nor on the renderer.
 
 pub mod distance;
 pub mod expand;
@@ -6,16 +6,18 @@ pub mod gpu_selection;
 pub mod layout;
 pub mod normals;
 pub mod place;
+pub mod shared;
 pub mod skirts;
 pub mod weights;
 
 use std::ops::Range;
 
 pub use gpu_selection::GpuSelection;
+use layout::VertexFormat;
 pub use layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 pub use normals::Normals;
 
-/// What a draw's indices address.
+/// The vertices that a draw's indices address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Source {
     /// [`Geometry::lattice`] of the resident geometry, once per instance, displaced by the height texture.
@@ -26,13 +28,13 @@ pub enum Source {
     Streamed,
 }
 
-/// How indices make triangles.
+/// Primitive topology of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Topology {
     /// Three indices a triangle, counter-clockwise seen from above.
     Triangles,
-    /// Each index makes a triangle with the two before it, the winding alternating. [`RESTART`] ends a strip; the next
-    /// one begins after an even number of indices, so that its winding is that of its place in the draw.
+    /// Each index makes a triangle with the two before it, with alternating winding. [`RESTART`] ends a strip. The next
+    /// strip begins after an even number of indices, so that its position in the draw gives its winding.
     Strip,
 }
 
@@ -46,99 +48,99 @@ pub struct Geometry {
     pub lattice: Vec<LatticeVertex>,
     /// Vertices with heights, for [`Source::Resident`] and [`Source::Streamed`].
     pub vertices: Vec<ExplicitVertex>,
-    /// Normals of the vertices, one each, where they are lit by them; else none.
+    /// Normals of the explicit vertices, one each, if they light them; else empty.
     pub normals: Vec<VertexNormals>,
-    /// Indices into one of the two, as the draw's source says.
+    /// Indices into `lattice` or `vertices`, depending on the draw's source.
     pub indices: Vec<u32>,
 }
 
 /// One indexed, instanced draw.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Draw {
-    /// What the indices address.
+    /// The vertices that the indices address.
     pub source: Source,
-    /// How they make triangles.
+    /// Primitive topology.
     pub topology: Topology,
-    /// Which indices.
+    /// Range of indices.
     pub indices: Range<u32>,
-    /// Which of the list's instances.
+    /// Range of the list's instances.
     pub instances: Range<u32>,
-    /// Added to each index: one pattern of indices serves meshes that lie one after the other.
+    /// Added to each index, so that meshes stored one after the other share one pattern of indices.
     pub first_vertex: u32,
 }
 
-/// A change to the resident geometry, made before the list is drawn.
+/// A change to the resident geometry that is made before the list is drawn.
 #[derive(Clone, Debug)]
 pub enum Upload {
-    /// Overwrites resident explicit vertices from the given one on.
+    /// Overwrites resident explicit vertices from this one on.
     Vertices(u32, Vec<ExplicitVertex>),
-    /// Overwrites normals of resident vertices from the given one on.
+    /// Overwrites normals of resident vertices from this one on.
     Normals(u32, Vec<VertexNormals>),
-    /// Overwrites resident indices from the given one on.
+    /// Overwrites resident indices from this one on.
     Indices(u32, Vec<u32>),
 }
 
-/// How the lattice vertices of a technique's lists move.
+/// Morphing of lattice vertices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Morph {
-    /// They do not.
+    /// Vertices do not morph.
     #[default]
     No,
-    /// To the next coarser level, or onto coarser sides, as their instance's [`weights`] say.
+    /// To the next coarser level, or onto coarser sides, by the [`weights`] of their instance.
     ByInstance,
-    /// The same, each as its own [`distance`] says.
+    /// To the next coarser level, each vertex by its own [`distance`].
     ByDistance,
 }
 
-/// How meshes of a technique's lists meet.
+/// Joints between the meshes of a list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Seams {
-    /// They share whole edges with the same ends: one surface without a gap.
+    /// Neighbours share whole edges with the same ends: one surface without gaps.
     #[default]
     Shared,
-    /// Each has edges of its own, and the skirt that hangs from the higher one reaches down to the lower one.
+    /// Neighbours have edges of their own. A skirt hangs from the higher edge down to the lower one.
     Skirts,
 }
 
-/// What keeps land behind other land out of the picture.
+/// Hidden-surface removal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthMode {
     /// A depth buffer: draws come in any order.
     #[default]
     Buffer,
-    /// The order of the triangles: the furthest one comes first, and the last one drawn shows (painter's algorithm).
+    /// Painter's algorithm: the farthest triangle is drawn first, and later ones cover it.
     Painter,
 }
 
-/// The kinds of draws that a technique's lists hold: what the executor has programs for.
+/// The kinds of draws that a technique's lists hold. Each needs a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DrawKinds {
-    /// Some are of [`Source::Lattice`].
+    /// Draws of [`Source::Lattice`].
     pub lattice: bool,
-    /// Some are of [`Source::Resident`] or [`Source::Streamed`]: one program draws both.
+    /// Draws of [`Source::Resident`] or [`Source::Streamed`], which share a pipeline.
     pub explicit: bool,
-    /// Some are [`Topology::Triangles`].
+    /// Draws of [`Topology::Triangles`].
     pub triangles: bool,
-    /// Some are [`Topology::Strip`].
+    /// Draws of [`Topology::Strip`].
     pub strips: bool,
 }
 
-/// What a technique's lists ask of the programs that draw them.
+/// The pipelines that a technique's lists need.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PipelineRequirements {
-    /// What the lists hold.
+    /// Kinds of draws in the lists.
     pub draws: DrawKinds,
-    /// How lattice vertices move.
+    /// Morphing of lattice vertices.
     pub morph: Morph,
-    /// How meshes meet: which of the two proofs lists pass ([`watertight`](crate::measure::watertight)).
+    /// Joints between meshes. They decide which proof the lists pass ([`watertight`](crate::measure::watertight)).
     pub seams: Seams,
-    /// Where normals come from.
+    /// Source of normals.
     pub normals: Normals,
-    /// What hides land behind other land.
+    /// Hidden-surface removal.
     pub depth_mode: DepthMode,
 }
 
-/// How draws reach the device; the triangles are the same.
+/// Submission of the draws. It does not change the triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Submission {
     /// One indirect command buffer per pipeline.
@@ -146,43 +148,42 @@ pub enum Submission {
     Indirect,
     /// One recorded draw call per draw.
     Direct,
-    /// The device finds draws and instances itself ([`GpuSelection`]) from [`DrawList::parameters`]; those in the list, if
+    /// Compute shaders find draws and instances ([`GpuSelection`]) from [`DrawList::parameters`]. Draws in the list, if
     /// any, were read back.
     GpuDriven,
 }
 
-/// What a technique wants drawn in one view.
+/// The draws of one view.
 #[derive(Clone, Debug)]
 pub struct DrawList {
-    /// The draws, those of one source and topology side by side.
+    /// The draws, grouped by source and topology.
     pub draws: Vec<Draw>,
     /// Instances, addressed by the draws' ranges.
     pub instances: Vec<Instance>,
     /// Geometry of this frame only.
     pub streamed: Geometry,
-    /// Bits of explicit vertices' positions that are parts of a sample: 0 where all lie on samples. The corners of the
-    /// list's triangles have as many, whatever their source.
+    /// Binary digits of a fraction of a sample in positions of explicit vertices: 0 if all lie on samples. The corners
+    /// of all triangles of the list have as many.
     pub fraction_bits: u32,
-    /// The height that heights of explicit vertices are relative to, metres. Near the eye's height, it keeps those
-    /// around the eye exact where single precision would round them.
+    /// The height that vertex heights are relative to, metres. A base near the eye's height keeps heights around the eye
+    /// exact where single precision would round them.
     pub height_base: f32,
     /// Changes to the resident geometry.
     pub uploads: Vec<Upload>,
-    /// How the draws reach the device.
+    /// Submission of the draws.
     pub submission: Submission,
-    /// What the device is told of the view where it finds the draws itself.
+    /// Words of shader parameters for [`Submission::GpuDriven`].
     pub parameters: Vec<u32>,
-    /// Land further from the eye in plan than this may be left out although it is in sight, metres: infinite unless a
-    /// technique was asked for an end.
+    /// Draw distance in plan, metres: infinite unless a setting of the technique limits it.
     pub reach_m: f64,
-    /// What the view's tolerance was multiplied by because the list would not have fitted its limits: 1 where
-    /// nothing was, infinite where no tolerance was kept.
+    /// Factor on the view's tolerance that made the list fit its limits: 1 if it fitted at once, infinite if it keeps no
+    /// tolerance.
     pub tolerance_scale: f64,
-    /// Instances in sight that are coarser than the tolerance allows because something finer is not there yet.
+    /// Instances in view that are coarser than the tolerance allows because finer data is still being built.
     pub pending: usize,
 }
 
-/// The most that any list of a technique holds: buffers of this size are made once.
+/// Upper bounds of all lists of a technique. Buffers of this size are made once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits {
     /// Draws in a list.
@@ -199,14 +200,14 @@ pub struct Limits {
     pub upload_bytes: usize,
 }
 
-/// What a technique keeps on the device, and the room that its lists need there.
+/// Geometry of a technique that stays on the device, and the buffer sizes that its lists need.
 #[derive(Clone, Copy, Debug)]
 pub struct DeviceGeometry<'a> {
     /// Geometry.
     pub geometry: &'a Geometry,
-    /// The most of any list.
+    /// Upper bounds of its lists.
     pub limits: Limits,
-    /// How the device finds draws itself, if it can.
+    /// Selection on the device, if the technique has one.
     pub gpu_selection: Option<&'a GpuSelection>,
 }
 
@@ -217,16 +218,16 @@ impl Default for DrawKinds {
 }
 
 impl DrawKinds {
-    /// Triangles of explicit vertices, and no other draws.
+    /// Triangle lists of explicit vertices only.
     pub const EXPLICIT: Self = Self::explicit(Topology::Triangles);
 
-    /// Explicit vertices in one topology, and no other draws.
+    /// Explicit vertices in one topology only.
     pub const fn explicit(topology: Topology) -> Self {
         let strips = matches!(topology, Topology::Strip);
         Self { lattice: false, explicit: true, triangles: !strips, strips }
     }
 
-    /// Whether such a draw is among them.
+    /// Returns true if such draws occur.
     pub fn hold(&self, source: Source, topology: Topology) -> bool {
         let has_source = if source == Source::Lattice { self.lattice } else { self.explicit };
         let has_topology = if topology == Topology::Strip { self.strips } else { self.triangles };
@@ -235,7 +236,7 @@ impl DrawKinds {
 }
 
 impl Topology {
-    /// Triangles that `indices` indices make at most, degenerate ones included: ends of strips are not known.
+    /// Upper bound of the triangles that `indices` indices make, degenerate ones included. It ignores ends of strips.
     pub fn triangles(self, indices: usize) -> usize {
         match self {
             Topology::Triangles => indices / 3,
@@ -245,8 +246,8 @@ impl Topology {
 }
 
 impl Draw {
-    /// The same triangles in the same order as several draws of at most `triangles` (or one instance's
-    /// indices cut there): pieces of work for those who walk them in parallel.
+    /// Splits the draw into draws of at most `triangles` each, with the same triangles in the same order. Parallel loops
+    /// over triangles use them as units of work.
     pub fn parts(&self, triangles: usize) -> Vec<Draw> {
         let own = self.topology.triangles(self.indices.len());
         if own == 0 {
@@ -260,7 +261,7 @@ impl Draw {
     }
 
     fn index_parts(&self, triangles: usize) -> Vec<Range<u32>> {
-        // A strip is cut after an even number of triangles, so that the winding goes on as it was.
+        // A strip is cut after an even number of triangles, which keeps the winding.
         let (step, shared) = match self.topology {
             Topology::Triangles => (3 * triangles.max(1), 0),
             Topology::Strip => (2 * triangles.div_ceil(2).max(1), 2),
@@ -308,12 +309,20 @@ impl DrawList {
         self.pending = 0;
     }
 
-    /// The height above zero of an explicit vertex's own height, metres, rounded.
+    /// The encoding of its explicit vertices.
+    pub fn vertex_format(&self) -> VertexFormat {
+        VertexFormat { fraction_bits: self.fraction_bits as i32, height_base: self.height_base }
+    }
+
+    /// Height above zero of a vertex's height, metres. Exact where the base is 0, else rounded once.
     pub fn absolute_height(&self, height: f32) -> f32 {
+        if self.height_base == 0.0 {
+            return height;
+        }
         (f64::from(height) + f64::from(self.height_base)) as f32
     }
 
-    /// Triangles the list submits, degenerate ones included.
+    /// Number of submitted triangles, degenerate ones included.
     pub fn triangles(&self) -> u64 {
         let of_draw = |d: &Draw| match (d.source, d.topology) {
             (Source::Streamed, Topology::Strip) => {
@@ -325,8 +334,8 @@ impl DrawList {
         self.draws.iter().map(|d| of_draw(d) as u64 * d.instances.len() as u64).sum()
     }
 
-    /// Draw calls that the host records for the list: one for each run of draws of one source and topology, or
-    /// one for each draw, or one for all that the device finds.
+    /// Number of draw calls that the host records: one for each run of draws of one source and topology, one for each
+    /// draw, or one in all, depending on the submission.
     pub fn commands(&self) -> usize {
         match self.submission {
             Submission::Direct => self.draws.len(),
@@ -337,7 +346,7 @@ impl DrawList {
         }
     }
 
-    /// Instances by level of detail, from the finest.
+    /// Number of instances of each level of detail, from the finest.
     pub fn levels(&self) -> Vec<usize> {
         let mut counts = Vec::new();
         for instance in &self.instances {
@@ -348,7 +357,7 @@ impl DrawList {
         counts
     }
 
-    /// What the list holds, in the terms of [`Limits`].
+    /// Sizes of the list.
     pub fn size(&self) -> Limits {
         let bytes = |upload: &Upload| match upload {
             Upload::Vertices(_, v) => size_of_val(v.as_slice()),
@@ -367,7 +376,7 @@ impl DrawList {
 }
 
 impl Limits {
-    /// Whether nothing in `size` exceeds these limits.
+    /// Returns true if no value of `size` exceeds these limits.
     pub fn hold(&self, size: &Limits) -> bool {
         size.draws <= self.draws
             && size.instances <= self.instances

@@ -1,35 +1,34 @@
-//! Normals that explicit vertices carry, and how they go over with their heights: the CPU twin of
-//! `shaders/position.glsl`.
+//! Normals of explicit vertices, which morph with the heights: the CPU reference of `shaders/position.glsl`.
 
 use glam::{Vec2, Vec3};
 
 use super::layout::{ExplicitVertex, Instance, VertexNormals};
 use super::place::explicit_weights;
 
-/// Where the normals come from by which a technique's triangles are lit.
+/// Source of the normals that light a technique's triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Normals {
-    /// From the height texture, for each pixel.
+    /// Computed from the height texture for each pixel.
     #[default]
     Texture,
-    /// From the vertices ([`Geometry::normals`](super::Geometry::normals)), between which they are interpolated.
+    /// Interpolated between the vertices ([`Geometry::normals`](super::Geometry::normals)).
     Vertices,
 }
 
-/// A unit vector that does not point down, in 32 bits: x below z, each a signed normalised 16-bit number.
+/// Packs a unit vector that does not point down in 32 bits: x in the lower half, z in the upper half, both snorm16.
 pub fn pack(normal: Vec3) -> u32 {
     let snorm = |n: f32| u32::from((n.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
     snorm(normal.x) | snorm(normal.z) << 16
 }
 
-/// What [`pack`] packed, to 1/32767 in x and z.
+/// Unpacks a normal, exact to 1/32767 in x and z.
 pub fn unpack(packed: u32) -> Vec3 {
     let plan = [packed, packed >> 16].map(|n| (f32::from(n as u16 as i16) / 32767.0).max(-1.0));
     let plan = Vec2::from(plan);
     Vec3::new(plan.x, (1.0 - plan.length_squared()).max(0.0).sqrt(), plan.y)
 }
 
-/// The unit normal of a vertex, gone over as far as its height has.
+/// Unit normal of a vertex at its morph weights.
 pub fn explicit_normal(instance: &Instance, vertex: &ExplicitVertex, normals: &VertexNormals) -> Vec3 {
     let [weight, second_target] = explicit_weights(instance, vertex);
     let target = unpack(normals.target).lerp(unpack(normals.second_target), second_target);

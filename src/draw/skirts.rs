@@ -1,24 +1,20 @@
-//! Meshes with skirts: four quadrants that share no vertex, and walls that hang under their sides.
+//! Meshes with skirts: four quadrants that share no vertex, and walls that hang from their sides.
 //!
-//! Each quadrant is a grid of lines of its own, with one line more beyond each of its sides, and two such grids lie
-//! along an axis: quadrants of s units make 2 (s + 3) lines. They are numbered from 0 to `cells` = 2 s + 5, an odd
-//! number, which no other mesh has, and a quarter turn maps them onto each other as it does those of other meshes.
-//! So the place alone tells the quadrant of a vertex and whether it is a skirt's: one on a line beyond a side lies
-//! under the nearest vertex of that side.
+//! Each quadrant is a grid of lines with one more line beyond each of its sides. Two such grids lie along an axis:
+//! quadrants of s units make 2 (s + 3) lines, numbered from 0 to `cells` = 2 s + 5. A quarter turn maps the lines onto
+//! each other as it does in other meshes. The position alone tells the quadrant of a vertex, and whether the vertex is a
+//! skirt's: a vertex on a line beyond a side hangs under the nearest vertex of that side.
 //!
-//! Quadrants go over to coarser levels by themselves, sides included, and no vertex falls onto another: of an
-//! instance's weights word 0 is as in [`weights`](super::weights), and words 1 and 2 are [`set`] here.
+//! Each quadrant morphs as a whole, sides included, and no vertex snaps to another: see [`SkirtWeights`].
 
 use super::Instance;
-use super::weights::{FINER, get, inside};
-
-/// Set in the level of a skirt's vertex, as fragments are told it.
-pub const SKIRT: u32 = 1 << 31;
+pub use super::layout::SKIRT;
+use super::layout::{SKIRT_WEIGHTS, SkirtWeights};
 
 /// A vertex of a mesh with skirts, after the turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkirtVertex {
-    /// Mesh units as in other meshes, where quadrants meet on a line: of a skirt's vertex, what it hangs from.
+    /// Mesh units as in other meshes, where quadrants meet on a line. For a skirt's vertex, the vertex it hangs from.
     pub at: [i32; 2],
     /// The quadrant, `(x half) + 2 (z half)`.
     pub quadrant: usize,
@@ -26,22 +22,23 @@ pub struct SkirtVertex {
     pub side: Option<usize>,
 }
 
-/// `cells` of a mesh of quadrants of so many units a side.
+/// `cells` of a mesh whose quadrants are this many units long.
 pub fn cells(quadrant_units: u32) -> u32 {
     2 * quadrant_units + 5
 }
 
-/// The line of a quadrant's half (0 or 1) and a place in it: from −1, beyond its first side, to one beyond its last.
+/// The line of a position in a quadrant's half (0 or 1). Positions run from -1, beyond the first side, to one beyond
+/// the last side.
 pub fn line(quadrant_units: i32, half: i32, place: i32) -> i32 {
     half * (quadrant_units + 3) + place + 1
 }
 
-/// Whether an instance's mesh has skirts.
+/// True if an instance's mesh has skirts.
 pub fn is_skirted(instance: &Instance) -> bool {
-    instance.cells & 1 == 1
+    instance.weights_kind == SKIRT_WEIGHTS
 }
 
-/// What a turned vertex is.
+/// Decodes a vertex after the rotation.
 pub fn skirt_vertex(instance: &Instance, turned: [i32; 2]) -> SkirtVertex {
     let lines = (instance.cells as i32 + 1) / 2;
     let half = turned.map(|n| n / lines);
@@ -58,23 +55,15 @@ pub fn skirt_vertex(instance: &Instance, turned: [i32; 2]) -> SkirtVertex {
 
 /// Level of detail of a quadrant.
 pub fn quadrant_level(instance: &Instance, quadrant: usize) -> i32 {
-    instance.level as i32 - i32::from(get(instance, inside(quadrant)) & FINER != 0)
+    instance.level as i32 - i32::from(instance.is_finer(quadrant))
 }
 
-/// How far a vertex hangs down, metres: 0 where its side has no skirt.
-pub fn depth(instance: &Instance, skirt_vertex: &SkirtVertex) -> f32 {
+/// Length by which a vertex hangs down, metres: 0 where its side has no skirt.
+pub fn depth(weights: &SkirtWeights, skirt_vertex: &SkirtVertex) -> f32 {
     match skirt_vertex.side {
-        Some(side) if instance.weights[1] >> (4 * skirt_vertex.quadrant + side) & 1 == 1 => {
-            f32::from_bits(instance.weights[2])
-        }
+        Some(side) if weights.sides >> (4 * skirt_vertex.quadrant + side) & 1 == 1 => weights.depth_m,
         _ => 0.0,
     }
-}
-
-/// Gives the sides of the quadrants whose bits, 4 · quadrant + side, are set skirts of a depth in metres.
-pub fn set(weights: &mut [u32; 4], sides: u32, depth_m: f32) {
-    weights[1] = sides;
-    weights[2] = depth_m.to_bits();
 }
 
 #[cfg(test)]
@@ -95,9 +84,9 @@ mod tests {
 
     #[test]
     fn skirts_hang_where_they_are_set() {
-        let mut instance = Instance { cells: cells(8), ..Instance::default() };
-        set(&mut instance.weights, 1 << (4 * 2 + 1), 7.5);
-        let hangs = |x, z| depth(&instance, &skirt_vertex(&instance, [x, z]));
+        let instance = Instance { cells: cells(8), ..Instance::default() };
+        let weights = SkirtWeights { inside: 0, sides: 1 << (4 * 2 + 1), depth_m: 7.5 };
+        let hangs = |x, z| depth(&weights, &skirt_vertex(&instance, [x, z]));
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, -1)), 7.5);
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, 0)), 0.0, "the side itself");
         assert_eq!(hangs(line(8, 0, 5), line(8, 1, 9)), 0.0, "the other side");

@@ -1,110 +1,220 @@
-//! How far the vertices of a lattice mesh have gone to coarser levels: sixteen bytes an instance.
+//! Morph weights of an instance: the three encodings, and the weights by slots.
 //!
-//! A mesh is four quadrants, number `q = (x half) + 2 (z half)` after the turn. Its vertices lie inside a quadrant,
-//! on an outer side, or on a seam between quadrants; half a side and half a seam belong to one quadrant each. A byte
-//! counts in [`ONE`]s: 0 is the vertex's own level, `ONE` the next coarser one, and on outer sides `2 ONE` the one
-//! after it. On an outer side from `ONE` on, and on a seam whose bit 7 is set, an odd vertex falls onto the even one
-//! before it, so that no T-junction is left where blocks of two levels meet. Integers, so that both meshes of a
-//! side agree to the bit.
+//! An instance has a tag and four words, which hold a [`SlotWeights`], a [`SkirtWeights`] or a [`DistanceWeights`].
+//! This file packs and unpacks them on the host, `shaders/weights.glsl` in shaders. All three keep the flag [`FINER`]
+//! of quadrant q in bit 7 of byte q of the first word.
 //!
-//! | word | bytes 0 and 1 | bytes 2 and 3 |
-//! |---|---|---|
-//! | 0 | inside of quadrants 0 and 1 | inside of 2 and 3; bit 7 of each: the quadrant is one level finer |
-//! | 1 | side x = 0, its z halves | side z = 0, its x halves |
-//! | 2 | side x = cells, its z halves | side z = cells, its x halves |
-//! | 3 | seam x = cells / 2, its z halves | seam z = cells / 2, its x halves |
+//! A mesh is four quadrants, number `q = (x half) + 2 (z half)` after the rotation. Its vertices lie inside a quadrant,
+//! on an outer side, or on a seam between quadrants. The halves of sides and seams and the insides of quadrants are the
+//! sixteen slots of a [`SlotWeights`], a byte each, in units of 1 / [`ONE`]. Weight 0 is the vertex's own level and
+//! `ONE` the next coarser one. On outer sides `2 ONE` is the level after that.
+//!
+//! An odd vertex snaps to the even one before it where blocks of two levels meet, so that no T-junction is left: on an
+//! outer side from weight `ONE` on, and on a seam with the flag [`STITCHED`]. Weights are integers, so that both meshes
+//! of a side agree to the bit.
 
 use super::Instance;
+use super::layout::{DISTANCE_WEIGHTS, FIRST_SIDE, LAST_SIDE, NO_LINE, SEAM, SKIRT_WEIGHTS, SLOT_WEIGHTS};
+pub use super::layout::{DistanceWeights, FINER, ONE, STITCHED, SkirtWeights, SlotWeights};
 
-/// The next coarser level. A power of two: the weight is exact as a float.
-pub const ONE: u32 = 64;
-
-/// Set in a quadrant's byte: the quadrant is one level finer than its instance's.
-pub const FINER: u32 = 128;
-
-/// Set in a seam's byte: one side of the seam is coarser than the other.
-pub const STITCHED: u32 = 128;
-
-/// Which byte of the weights: word, byte.
-pub type Slot = (usize, u32);
-
-/// The byte of the inside of a quadrant.
-pub fn inside(quadrant: usize) -> Slot {
-    (0, quadrant as u32)
+/// The weights of an instance in one of their encodings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Weights {
+    /// A weight for each slot.
+    Slots(SlotWeights),
+    /// A mesh with skirts: a weight for each quadrant.
+    Skirts(SkirtWeights),
+    /// Each vertex has the weight of its distance to the eye.
+    Distance(DistanceWeights),
 }
 
-/// What a vertex that carries its height says to have the weight of a slot: on the way to the next level (stage 0), or
-/// from that to the one after it (1). From 1 to 32.
-pub fn region((word, byte): Slot, stage: u32) -> u32 {
-    1 + 16 * stage + 4 * word as u32 + byte
-}
-
-/// The weight of a region, in [`ONE`]s, at most one; 0 of none.
-pub fn region_weight(instance: &Instance, region: u32) -> u32 {
-    if region == 0 {
-        return 0;
+impl Instance {
+    /// Unpacks the weights.
+    pub fn weights(&self) -> Weights {
+        match self.weights_kind {
+            SKIRT_WEIGHTS => Weights::Skirts(SkirtWeights::of(self)),
+            DISTANCE_WEIGHTS => Weights::Distance(DistanceWeights::of(self)),
+            _ => Weights::Slots(SlotWeights::of(self)),
+        }
     }
-    let (slot, stage) = ((region - 1) & 15, (region - 1) >> 4);
-    get(instance, (slot as usize / 4, slot % 4)).saturating_sub(stage * ONE).min(ONE)
-}
 
-/// Weights that all quadrants share: of the inside, and of the sides x = 0, z = 0, x = cells and z = cells.
-pub fn uniform(inside: u32, [x_first, z_first, x_last, z_last]: [u32; 4]) -> [u32; 4] {
-    let sides = |x: u32, z: u32| x * 0x0101 + z * 0x0101_0000;
-    let all = inside * 0x0101_0101;
-    [all, sides(x_first, z_first), sides(x_last, z_last), all]
-}
+    /// The instance with other weights.
+    pub fn with_weights(self, weights: impl Into<Weights>) -> Self {
+        let (weights_kind, weights_words) = match weights.into() {
+            Weights::Slots(w) => (SLOT_WEIGHTS, [w.inside, w.first_sides, w.last_sides, w.seams]),
+            Weights::Skirts(w) => (SKIRT_WEIGHTS, [w.inside, w.sides, w.depth_m.to_bits(), 0]),
+            Weights::Distance(w) => {
+                let [range, finer_range, above] = [w.range, w.finer_range, w.above_squared].map(f32::to_bits);
+                (DISTANCE_WEIGHTS, [w.flags, range, finer_range, above])
+            }
+        };
+        Self { weights_kind, weights_words, ..self }
+    }
 
-/// Writes one byte.
-pub fn set(weights: &mut [u32; 4], (word, byte): Slot, weight: u32) {
-    weights[word] |= weight << (8 * byte);
-}
-
-/// Reads one byte.
-pub fn get(instance: &Instance, (word, byte): Slot) -> u32 {
-    (instance.weights[word] >> (8 * byte)) & 255
-}
-
-/// Whether odd vertices there fall onto even ones.
-pub fn is_stitched(instance: &Instance, slot: Slot) -> bool {
-    match slot.0 {
-        0 => false,
-        3 => get(instance, slot) & STITCHED != 0,
-        _ => get(instance, slot) >= ONE,
+    /// True if a quadrant is one level finer than the instance, in any encoding.
+    pub fn is_finer(&self, quadrant: usize) -> bool {
+        self.weights_words[0] >> (8 * quadrant) & FINER != 0
     }
 }
 
-/// The slot of a turned vertex. Where lines cross no level within reach lacks the vertex, and any will do.
-pub fn slot(instance: &Instance, [x, z]: [i32; 2]) -> Slot {
-    let cells = instance.cells as i32;
-    let half = |n: i32| u32::from(2 * n >= cells);
-    match (line(cells, x), line(cells, z)) {
-        (side @ (1 | 2), _) => (side, half(z)),
-        (_, side @ (1 | 2)) => (side, 2 + half(x)),
-        (3, _) => (3, half(z)),
-        (_, 3) => (3, 2 + half(x)),
-        _ => (0, half(x) + 2 * half(z)),
+impl SlotWeights {
+    /// Unpacks the weights of an instance of this kind.
+    pub fn of(instance: &Instance) -> Self {
+        let [inside, first_sides, last_sides, seams] = instance.weights_words;
+        Self { inside, first_sides, last_sides, seams }
+    }
+
+    /// Weights that all quadrants share: inside, and on the sides x = 0, z = 0, x = cells and z = cells.
+    pub fn uniform(inside: u32, [x_first, z_first, x_last, z_last]: [u32; 4]) -> Self {
+        let sides = |x: u32, z: u32| x * 0x0101 + z * 0x0101_0000;
+        let all = inside * 0x0101_0101;
+        Self { inside: all, first_sides: sides(x_first, z_first), last_sides: sides(x_last, z_last), seams: all }
+    }
+
+    /// The byte of a slot, flags included.
+    pub fn get(&self, slot: Slot) -> u32 {
+        let word = match slot.line {
+            NO_LINE => self.inside,
+            FIRST_SIDE => self.first_sides,
+            LAST_SIDE => self.last_sides,
+            _ => self.seams,
+        };
+        word >> (8 * slot.byte) & 255
+    }
+
+    /// Adds bits to the byte of a slot.
+    pub fn set(&mut self, slot: Slot, weight: u32) {
+        let word = match slot.line {
+            NO_LINE => &mut self.inside,
+            FIRST_SIDE => &mut self.first_sides,
+            LAST_SIDE => &mut self.last_sides,
+            _ => &mut self.seams,
+        };
+        *word |= weight << (8 * slot.byte);
+    }
+
+    /// True if odd vertices of a slot snap to even ones.
+    pub fn is_stitched(&self, slot: Slot) -> bool {
+        match slot.line {
+            NO_LINE => false,
+            SEAM => self.get(slot) & STITCHED != 0,
+            _ => self.get(slot) >= ONE,
+        }
+    }
+
+    /// The weight of a region, 0 to [`ONE`]; 0 of region 0.
+    pub fn of_region(&self, region: u32) -> u32 {
+        if region == 0 {
+            return 0;
+        }
+        let (slot, stage) = ((region - 1) & 15, (region - 1) >> 4);
+        self.get(Slot { line: slot as i32 / 4, byte: slot % 4 }).saturating_sub(stage * ONE).min(ONE)
     }
 }
 
-/// Whether a coordinate is that of the first side (1), the last side (2), the seam (3), or of none (0).
-fn line(cells: i32, n: i32) -> usize {
+impl SkirtWeights {
+    /// Unpacks the weights of an instance of this kind.
+    pub fn of(instance: &Instance) -> Self {
+        let [inside, sides, depth, _] = instance.weights_words;
+        Self { inside, sides, depth_m: f32::from_bits(depth) }
+    }
+
+    /// The weight of a quadrant, without its flag.
+    pub fn inside(&self, quadrant: usize) -> u32 {
+        self.inside >> (8 * quadrant) & 255 & !FINER
+    }
+}
+
+impl DistanceWeights {
+    /// Unpacks the weights of an instance of this kind.
+    pub fn of(instance: &Instance) -> Self {
+        let [flags, range, finer_range, above] = instance.weights_words;
+        let [range, finer_range, above_squared] = [range, finer_range, above].map(f32::from_bits);
+        Self { flags, range, finer_range, above_squared }
+    }
+}
+
+impl From<SlotWeights> for Weights {
+    fn from(weights: SlotWeights) -> Self {
+        Self::Slots(weights)
+    }
+}
+
+impl From<SkirtWeights> for Weights {
+    fn from(weights: SkirtWeights) -> Self {
+        Self::Skirts(weights)
+    }
+}
+
+impl From<DistanceWeights> for Weights {
+    fn from(weights: DistanceWeights) -> Self {
+        Self::Distance(weights)
+    }
+}
+
+/// A byte of a [`SlotWeights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// [`NO_LINE`], [`FIRST_SIDE`], [`LAST_SIDE`] or [`SEAM`].
+    pub line: i32,
+    /// Number of the byte in the word of the line.
+    pub byte: u32,
+}
+
+impl Slot {
+    /// The inside of a quadrant.
+    pub fn inside(quadrant: u32) -> Self {
+        Self { line: NO_LINE, byte: quadrant }
+    }
+
+    /// The slot of a vertex after the rotation. Where lines cross no level within reach lacks the vertex, and any slot
+    /// is right.
+    pub fn of_vertex(instance: &Instance, [x, z]: [i32; 2]) -> Self {
+        let cells = instance.cells as i32;
+        let half = |n: i32| u32::from(2 * n >= cells);
+        let (line, byte) = match (line(cells, x), line(cells, z)) {
+            (side @ (FIRST_SIDE | LAST_SIDE), _) => (side, half(z)),
+            (_, side @ (FIRST_SIDE | LAST_SIDE)) => (side, 2 + half(x)),
+            (SEAM, _) => (SEAM, half(z)),
+            (_, SEAM) => (SEAM, 2 + half(x)),
+            _ => (NO_LINE, half(x) + 2 * half(z)),
+        };
+        Self { line, byte }
+    }
+
+    /// True on an outer side.
+    pub fn is_outer(self) -> bool {
+        self.line == FIRST_SIDE || self.line == LAST_SIDE
+    }
+
+    /// True if the slot's line runs along z.
+    pub fn is_upright(self) -> bool {
+        self.byte < 2
+    }
+
+    /// Number, 1 to 32, by which an explicit vertex refers to the slot: at stage 0 on the way to the next level, at
+    /// stage 1 on the way from that to the one after it.
+    pub fn region(self, stage: u32) -> u32 {
+        1 + 16 * stage + 4 * self.line as u32 + self.byte
+    }
+}
+
+/// The line that a coordinate lies on.
+fn line(cells: i32, n: i32) -> i32 {
     match n {
-        0 => 1,
-        _ if n == cells => 2,
-        _ if 2 * n == cells => 3,
-        _ => 0,
+        0 => FIRST_SIDE,
+        _ if n == cells => LAST_SIDE,
+        _ if 2 * n == cells => SEAM,
+        _ => NO_LINE,
     }
 }
 
-/// Level of detail at a turned vertex: of the finest quadrant that it touches.
+/// Level of detail at a vertex after the rotation: of the finest quadrant that it touches.
 pub fn vertex_level(instance: &Instance, turned: [i32; 2]) -> i32 {
     let cells = instance.cells as i32;
     let touches = |n: i32, half: usize| if half == 0 { 2 * n <= cells } else { 2 * n >= cells };
-    let finer = (0..4).any(|quadrant: usize| {
-        touches(turned[0], quadrant & 1)
-            && touches(turned[1], quadrant >> 1)
-            && get(instance, inside(quadrant)) & FINER != 0
+    let is_finer = (0..4).any(|quadrant: usize| {
+        touches(turned[0], quadrant & 1) && touches(turned[1], quadrant >> 1) && instance.is_finer(quadrant)
     });
-    instance.level as i32 - i32::from(finer)
+    instance.level as i32 - i32::from(is_finer)
 }

@@ -1,4 +1,4 @@
-//! One set of descriptors of a pass's own, written once, and the layout of the pipelines that read it.
+//! A descriptor set of a pass, written once, and the pipeline layout that goes with it.
 
 use std::sync::Arc;
 
@@ -8,31 +8,31 @@ use ash::vk;
 use super::device::Gpu;
 use super::memory::Buffer;
 
-/// What stands at a binding.
+/// The resource at a binding.
 #[derive(Clone, Copy)]
 pub(super) enum Bound<'a> {
-    /// A buffer of constants.
+    /// A uniform buffer.
     Uniform(&'a Buffer),
-    /// A buffer that shaders read or write.
+    /// A storage buffer.
     Storage(&'a Buffer),
-    /// An image as shaders read it, in the layout it has then.
+    /// A sampled image with its sampler and its layout.
     Texture(vk::Sampler, vk::ImageView, vk::ImageLayout),
 }
 
-/// The set and the layout.
+/// A descriptor set and its layouts.
 pub(super) struct Bindings {
     gpu: Arc<Gpu>,
     set_layout: vk::DescriptorSetLayout,
     pool: vk::DescriptorPool,
-    /// The layout of the pipelines.
+    /// Layout of the pass's pipelines.
     pub layout: vk::PipelineLayout,
-    /// The set: number 1 after one of the scene, else number 0.
+    /// The set: number 1 if the pass reads the scene's set too, else number 0.
     pub set: vk::DescriptorSet,
 }
 
 impl Bindings {
-    /// Binds these, counted from 0, for shaders of some stages that also get `constants` bytes pushed. `scene`: the
-    /// layout of the scene's own set, if they read that too. What is bound must outlive the use of the set.
+    /// Binds resources at bindings 0, 1, … for shaders of some stages, with `constants` bytes of push constants. `scene`:
+    /// layout of the scene's set, if the shaders read it too. The resources must outlive the use of the set.
     pub fn new(
         gpu: &Arc<Gpu>,
         name: &str,
@@ -51,7 +51,7 @@ impl Bindings {
         let sizes: Vec<_> =
             bound.iter().map(|b| vk::DescriptorPoolSize { ty: b.kind(), descriptor_count: 1 }).collect();
         let pushed = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: constants as u32 }];
-        // SAFETY: the device is alive; Drop destroys what was made, also if a later step fails.
+        // SAFETY: the device is alive; Drop destroys the objects, also if a later step fails.
         unsafe {
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&entries);
             bindings.set_layout = gpu.raw.create_descriptor_set_layout(&info, None)?;
@@ -86,7 +86,7 @@ impl Bindings {
                 }
             })
             .collect();
-        // SAFETY: the set is not in use yet, and what is bound outlives its use.
+        // SAFETY: the set is not in use yet, and the resources outlive its use.
         unsafe { self.gpu.raw.update_descriptor_sets(&writes, &[]) };
     }
 }

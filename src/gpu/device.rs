@@ -143,6 +143,7 @@ fn missing_features(instance: &Instance, raw: vk::PhysicalDevice) -> Vec<String>
         (v12.scalar_block_layout, "scalarBlockLayout"),
         (v12.host_query_reset, "hostQueryReset"),
         (v13.dynamic_rendering, "dynamicRendering"),
+        (v13.maintenance4, "maintenance4"),
         (v13.synchronization2, "synchronization2"),
         (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
     ]
@@ -211,6 +212,8 @@ impl Gpu {
             .draw_indirect_count(counts_draws);
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
+            // Compilers state the size of workgroups by LocalSizeId, which needs it.
+            .maintenance4(true)
             .synchronization2(true)
             .shader_demote_to_helper_invocation(true);
         let has_clock = clock::is_readable(instance, candidate.raw);

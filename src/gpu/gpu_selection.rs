@@ -74,7 +74,7 @@ impl GpuSelector {
         }
         for program in gpu_selection.programs {
             let layout = gpu_selector.slots[0].bindings.layout;
-            let pipeline = pipelines::compute(&gpu_selector.gpu, layout, program, program, &Constants::new(&[]))?;
+            let pipeline = pipelines::compute(&gpu_selector.gpu, layout, program, program, &Constants::none())?;
             gpu_selector.pipelines.push(pipeline);
         }
         gpu_selector.slots.iter().try_for_each(|slot| gpu_selector.record(slot))?;

@@ -1,4 +1,4 @@
-//! Sampled images: the height pages, the hole mask, and pictures.
+//! Sampled images: pages of heights, the hole mask, and overlays; and their samplers.
 
 use std::sync::Arc;
 
@@ -13,15 +13,15 @@ use crate::plan::{ScenePlan, mip_levels};
 use crate::texture::mipmaps;
 use crate::texture::overlay_pyramid::Picture;
 
-/// Bytes staged at once: rows are copied in bands of this size, so that staging stays small beside the field.
+/// Size of a band of rows that is staged at once, bytes: staging stays small beside the field.
 const STAGING: u64 = 32 << 20;
 
-/// The field's heights as an array of pages.
+/// Creates the field's height texture, an array of pages.
 pub fn heights(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     surface(gpu, plan, "heights", field)
 }
 
-/// The heights of a cave's ceiling, alike; a stand-in of one texel where there is none.
+/// Creates the height texture of a cave's ceiling; a placeholder of one texel if there is none.
 pub fn ceiling(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     match field.ceiling().filter(|_| plan.ceiling) {
         Some(ceiling) => surface(gpu, plan, "ceiling", ceiling),
@@ -40,7 +40,7 @@ fn surface(gpu: &Arc<Gpu>, plan: &ScenePlan, purpose: &'static str, field: &Fiel
     })
 }
 
-/// One byte a sample, not 0 for holes; a stand-in of one texel if the plan leaves holes out.
+/// Creates the hole mask, a byte a sample, not 0 in holes; a placeholder of one texel if the plan omits holes.
 pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     if !plan.holes {
         return one_texel(gpu, "no holes", vk::Format::R8_UINT, Some(1), &[0]);
@@ -50,7 +50,7 @@ pub fn holes(gpu: &Arc<Gpu>, plan: &ScenePlan, field: &Field) -> Result<Image> {
     })
 }
 
-/// A picture laid over the field, with its mipmap levels; a stand-in of one texel if there is none.
+/// Creates the overlay with its mipmap levels; a placeholder of one texel if there is none.
 pub fn overlay(gpu: &Arc<Gpu>, picture: Option<&image::RgbaImage>) -> Result<Image> {
     const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
     let Some(rgba) = picture else { return one_texel(gpu, "no overlay", FORMAT, None, &[255; 4]) };
@@ -70,7 +70,7 @@ pub fn overlay(gpu: &Arc<Gpu>, picture: Option<&image::RgbaImage>) -> Result<Ima
     Ok(image)
 }
 
-/// A stand-in of one texel.
+/// Creates a placeholder of one texel.
 fn one_texel(
     gpu: &Arc<Gpu>,
     purpose: &'static str,
@@ -90,7 +90,7 @@ fn info(purpose: &'static str, size: [u32; 2], layers: Option<u32>, format: vk::
     ImageInfo { purpose, size, layers, format, usage }
 }
 
-/// Fills one level of an image without further layers.
+/// Fills one level of an image of one layer.
 fn level(gpu: &Arc<Gpu>, image: &Image, level: u32, size: [u32; 2], data: &[u8]) -> Result<()> {
     let row = data.len() as u64 / u64::from(size[1]);
     upload(gpu, image, (level, 1), size, row, |_, y, rows, staging| {
@@ -114,7 +114,7 @@ fn paged(
     upload(gpu, &image, (0, layers), size, u64::from(size[0]) * texel, |layer, y, count, staging| {
         let corner = [layer % columns * size[0], layer / columns * size[1]];
         for z in corner[1] + y..corner[1] + y + count {
-            // What sticks out of the field is never read; it repeats the last row and stays short.
+            // Texels outside the field are never read: rows repeat the last one, columns are 0.
             let z = z.min(stored[1] - 1) as usize;
             let width = size[0].min(stored[0] - corner[0]) as usize;
             copy(z * stored[0] as usize + corner[0] as usize, width, staging);
@@ -125,17 +125,17 @@ fn paged(
     Ok(image)
 }
 
-/// As copies write an image.
+/// State of an image that copies write.
 const WRITTEN: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-/// As any shader samples it.
+/// State of an image that shaders sample.
 const SAMPLED: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout) = (
     vk::PipelineStageFlags2::ALL_COMMANDS,
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
 
-/// Makes a new image ready for copies.
+/// Transitions a new image for copies.
 fn begin(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
     let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
     once(gpu, |r| {
@@ -144,7 +144,7 @@ fn begin(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
     })
 }
 
-/// Makes a written image ready for sampling.
+/// Transitions a written image for sampling.
 fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
     once(gpu, |r| {
         barriers(gpu, r.commands, &[image.barrier(WRITTEN, SAMPLED)]);
@@ -152,8 +152,8 @@ fn finish(gpu: &Arc<Gpu>, image: &Image) -> Result<()> {
     })
 }
 
-/// Fills a level of all layers of an image that is ready for copies, band by band. `fill(layer, first row, rows, out)`
-/// appends the rows' bytes.
+/// Fills a level of all layers of an image, band by band. `fill(layer, first row, rows, out)` appends the rows' bytes.
+/// The image must be in the state [`WRITTEN`].
 fn upload(
     gpu: &Arc<Gpu>,
     image: &Image,
@@ -193,20 +193,20 @@ fn upload(
     Ok(())
 }
 
-/// How an image is sampled.
+/// Filtering and addressing of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
-    /// Single texels.
+    /// Nearest texel.
     Texels,
-    /// Linear, the edge texel beyond the edge.
+    /// Linear, clamped to the edge.
     Clamped,
     /// Linear, repeating.
     Repeated,
-    /// Linear, repeating along some axes (x, z) and with the edge texel beyond the edge of others.
+    /// Linear, repeating along the axes (x, z) that are true and clamped to the edge along others.
     Along([bool; 2]),
 }
 
-/// A sampler. What uses it has ended when it is dropped.
+/// A sampler. It must not be in use when it is dropped.
 pub struct Sampler {
     /// The sampler.
     pub raw: vk::Sampler,
@@ -215,12 +215,12 @@ pub struct Sampler {
 
 impl Drop for Sampler {
     fn drop(&mut self) {
-        // SAFETY: it is not in use any more.
+        // SAFETY: nothing uses it any more.
         unsafe { self.gpu.raw.destroy_sampler(self.raw, None) };
     }
 }
 
-/// Makes a sampler.
+/// Creates a sampler.
 pub fn sampler(gpu: &Arc<Gpu>, sampling: Sampling) -> Result<Sampler> {
     let (filter, mipmap) = match sampling {
         Sampling::Texels => (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST),

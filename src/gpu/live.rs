@@ -1,6 +1,7 @@
-//! How much of a shader is left once its specialization constants are known: constants are folded, branches that they
-//! decide are followed one way only, and what nothing uses is not counted (sparse conditional constant propagation,
-//! Wegman & Zadeck 1991). A driver does at least that.
+//! Counts the instructions of a shader that are left once its specialization constants are known.
+//!
+//! Constants are folded, branches that they decide are followed one way only, and unused results are not counted (sparse
+//! conditional constant propagation, Wegman & Zadeck 1991). A driver does at least that.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,11 +10,11 @@ use rspirv::spirv::{Decoration, Op, Word};
 
 type Values = BTreeMap<Word, u32>;
 
-/// Instructions that can run, of the entry point and of what it calls, without labels and merges. `constants` are the
-/// specialization constants in the order of their ids; further ones have their defaults.
+/// Returns the number of instructions that can run in the entry point and its callees, without labels and merges.
+/// `constants` are the specialization constants in the order of their ids; further ones have their defaults.
 ///
 /// # Panics
-/// If the words are no SPIR-V: they are of this program's own compiler.
+/// If the words are not SPIR-V.
 pub fn instructions(words: &[u32], constants: &[u32]) -> usize {
     let module = dr::load_words(words).expect("SPIR-V of our own compiler");
     let globals = globals(&module, constants);
@@ -45,7 +46,7 @@ fn literals(instruction: &Instruction) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Constants of 32 bits and less that are known: `true` is 1.
+/// Values of the constants of at most 32 bits; `true` is 1.
 fn globals(module: &dr::Module, constants: &[u32]) -> Values {
     let is_id = |i: &&Instruction| i.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId));
     let decorated = module.annotations.iter().filter(is_id);
@@ -71,7 +72,7 @@ fn globals(module: &dr::Module, constants: &[u32]) -> Values {
     values
 }
 
-/// What an operation gives, if what is known of its operands decides it.
+/// Result of an operation, if its known operands decide it.
 fn folded(op: Op, instruction: &Instruction, values: &Values) -> Option<u32> {
     let operands: Vec<Option<u32>> = ids(instruction).map(|id| values.get(&id).copied()).collect();
     let flag = |is: bool| Some(u32::from(is));
@@ -98,7 +99,7 @@ fn folded(op: Op, instruction: &Instruction, values: &Values) -> Option<u32> {
     }
 }
 
-/// The instructions of a function that can run and matter.
+/// The instructions of a function that can run and have an effect.
 fn live<'a>(function: &'a Function, globals: &Values) -> Vec<&'a Instruction> {
     let (reached, values) = reached(function, globals);
     let running: Vec<_> = reached.into_iter().flat_map(|block| &function.blocks[block].instructions).collect();
@@ -113,14 +114,14 @@ fn live<'a>(function: &'a Function, globals: &Values) -> Vec<&'a Instruction> {
         }
         needed.extend(ids(instruction).filter_map(|id| defined.get(&id).copied()));
         if instruction.class.opcode == Op::Variable {
-            // Somebody looks at it: what is written to it matters.
+            // The variable is read: stores to it have an effect.
             needed.extend(running.iter().copied().filter(|i| local(i) == instruction.result_id));
         }
     }
     running.into_iter().filter(|i| found.contains(&std::ptr::from_ref(*i))).collect()
 }
 
-/// The variable of the function that an instruction stores to, if it does.
+/// The local variable to which an instruction stores, if any.
 fn local_variable(store: &Instruction, defined: &BTreeMap<Word, &Instruction>) -> Option<Word> {
     if store.class.opcode != Op::Store {
         return None;
@@ -132,7 +133,7 @@ fn local_variable(store: &Instruction, defined: &BTreeMap<Word, &Instruction>) -
     target.result_id.filter(|_| target.class.opcode == Op::Variable)
 }
 
-/// Whether an instruction matters by itself, not by its result.
+/// Returns true if an instruction has an effect beside its result.
 fn acts(instruction: &Instruction) -> bool {
     let op = instruction.class.opcode;
     match op {
@@ -142,7 +143,7 @@ fn acts(instruction: &Instruction) -> bool {
     }
 }
 
-/// The blocks that can be reached, and what is known of the function's values.
+/// The reachable blocks, and the known values of the function.
 fn reached(function: &Function, globals: &Values) -> (BTreeSet<usize>, Values) {
     let place: BTreeMap<Word, usize> = function
         .blocks
@@ -176,7 +177,7 @@ fn reached(function: &Function, globals: &Values) -> (BTreeSet<usize>, Values) {
     }
 }
 
-/// Where a branch may go.
+/// Possible targets of a branch.
 fn targets(branch: &Instruction, values: &Values) -> Vec<Word> {
     let operands: Vec<Word> = ids(branch).collect();
     match branch.class.opcode {
@@ -196,7 +197,7 @@ fn targets(branch: &Instruction, values: &Values) -> Vec<Word> {
     }
 }
 
-/// The one value with which all edges taken so far come to a block, if they do with one.
+/// Value of a phi, if all edges found so far bring the same one.
 fn joined(phi: &Instruction, block: Word, edges: &BTreeSet<(Word, Word)>, values: &Values) -> Option<u32> {
     let operands: Vec<Word> = ids(phi).collect();
     let mut coming = operands.chunks_exact(2).filter(|pair| edges.contains(&(pair[1], block)));
@@ -208,23 +209,21 @@ fn joined(phi: &Instruction, block: Word, edges: &BTreeSet<(Word, Word)>, values
 mod tests {
     use super::*;
     use crate::gpu::shaders;
+    use crate::plan::{Colour, SceneConstants};
 
-    /// Each constant of the fragment program that is off saves something, and what is decided is at most what is not.
+    /// A constant that is off removes instructions of the fragment shader.
     #[test]
     fn what_constants_decide_is_not_counted() {
         let words = shaders::words("terrain.frag");
-        let off = [0; 13];
-        let lean = instructions(&words, &off);
-        let with = |k: usize, value: u32| {
-            let mut values = off;
-            values[k] = value;
-            instructions(&words, &values)
-        };
-        let [holes, fog, overlay] = [with(3, 1), with(4, 1), with(5, 2)];
+        let off = SceneConstants::default();
+        let count = |constants: SceneConstants| instructions(&words, &constants.words());
+        let lean = count(off);
+        let [holes, fog] = [SceneConstants { holes: true, ..off }, SceneConstants { fog: true, ..off }].map(count);
+        let overlay = count(SceneConstants { colour: Colour::Overlay, ..off });
         println!("terrain.frag: {lean} instructions; holes {holes}, fog {fog}, overlay {overlay}");
         assert!(lean > 50 && holes > lean && fog > lean);
         assert_ne!(overlay, lean);
-        // All of the module, labels and what runs never included.
+        // All instructions of the module, live or not.
         let module = dr::load_words(&words).unwrap();
         let all: usize = module.functions.iter().flat_map(|f| &f.blocks).map(|block| block.instructions.len()).sum();
         assert!(instructions(&words, &[1; 13]) < all && fog < all);

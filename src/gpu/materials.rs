@@ -1,4 +1,4 @@
-//! The materials of the ground, with their mipmaps.
+//! The detail textures of the ground with their mipmaps.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use crate::texture::detail::{self, LEVELS, SIDE, Texel};
 
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;
 
-/// An array with a layer for each material; a stand-in of one texel, plain as they are on average, if the plan leaves
-/// them out.
+/// Creates an array image with a layer for each material. If the plan omits detail textures, it is a placeholder of one
+/// mean texel.
 pub fn image(gpu: &Arc<Gpu>, plan: &ScenePlan) -> Result<Image> {
     if plan.detail {
         return filled(gpu, "detail textures", SIDE, &detail::layers());
@@ -22,7 +22,7 @@ pub fn image(gpu: &Arc<Gpu>, plan: &ScenePlan) -> Result<Image> {
     filled(gpu, "no detail textures", 1, &[vec![vec![[128; 4]]]])
 }
 
-/// An image with these levels, layer by layer and each from its finest, of which each has half the side of the last.
+/// Creates an array image. `layers` holds the mip levels of each layer from the finest, of side `side`.
 fn filled(gpu: &Arc<Gpu>, purpose: &'static str, side: u32, layers: &[Vec<Vec<Texel>>]) -> Result<Image> {
     let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
     let info = ImageInfo { purpose, size: [side; 2], layers: Some(layers.len() as u32), format: FORMAT, usage };
@@ -45,7 +45,7 @@ fn filled(gpu: &Arc<Gpu>, purpose: &'static str, side: u32, layers: &[Vec<Vec<Te
     Ok(image)
 }
 
-/// Where each level of each layer comes from and goes to.
+/// Copy regions from a buffer that holds all levels of all layers in turn.
 fn regions(side: u32, layers: &[Vec<Vec<Texel>>]) -> Vec<vk::BufferImageCopy> {
     debug_assert!(layers.iter().all(|levels| levels.len() as u32 <= LEVELS));
     let mut offset = 0;

@@ -1,4 +1,4 @@
-//! Pipelines: one per source that occurs, each specialised to the scene plan; and the sky's.
+//! Graphics pipelines of a scene: one per kind of draws, specialised to the plan, and the sky's.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
@@ -16,24 +16,24 @@ use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals
 use crate::draw::{Normals, Source, Topology};
 use crate::plan::ScenePlan;
 
-/// The pipelines of a scene, and the layout they share.
+/// The pipelines of a scene and their common layout.
 pub struct Pipelines {
     gpu: Arc<Gpu>,
-    /// Set 0: the frame and the scene's images.
+    /// Layout of set 0: the frame and the scene's images.
     pub set_layout: vk::DescriptorSetLayout,
-    /// The layout of all.
+    /// Layout of all pipelines.
     pub layout: vk::PipelineLayout,
-    /// Behind the land.
+    /// The sky.
     pub sky: vk::Pipeline,
-    /// Whether depth says what hides what; else what is drawn last does.
+    /// True if pictures have a depth buffer.
     pub has_depth: bool,
     terrain: BTreeMap<(Source, Topology), vk::Pipeline>,
 }
 
 impl Pipelines {
-    /// Makes the pipelines for a plan, drawing to these formats.
+    /// Creates the pipelines of a plan for targets of these formats.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, formats: Formats) -> Result<Self> {
-        // The scene's images, the picture's maps, and their table.
+        // The scene's images, the tiles of the virtual texture, and its page table.
         let images = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; IMAGES + 1];
         let kinds = std::iter::once(vk::DescriptorType::UNIFORM_BUFFER).chain(images);
         let kinds = kinds.chain([vk::DescriptorType::STORAGE_BUFFER]);
@@ -66,10 +66,12 @@ impl Pipelines {
         Ok(pipelines)
     }
 
-    /// The pipeline that draws such draws. Resident and streamed geometry share one.
+    /// Pipeline for draws of a source and topology. Resident and streamed geometry share one.
     ///
     /// # Panics
-    /// If the plan has no such draws: techniques state them in their manner.
+    /// If the plan has no such draws: the technique must declare them in its [`PipelineRequirements`].
+    ///
+    /// [`PipelineRequirements`]: crate::draw::PipelineRequirements
     pub fn terrain(&self, source: Source, topology: Topology) -> vk::Pipeline {
         let program = if source == Source::Lattice { source } else { Source::Resident };
         *self.terrain.get(&(program, topology)).expect("a kind of draw that the technique states")
@@ -80,11 +82,11 @@ impl Pipelines {
             name: "sky",
             vertex: "sky.vert",
             fragment: Some("sky.frag"),
-            constants: &Constants::new(&[]),
+            constants: &Constants::none(),
             input: vk::PipelineVertexInputStateCreateInfo::default(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             wireframe: false,
-            // Only where nothing was drawn.
+            // Passes only where depth is still cleared.
             depth: formats.depth.map(|_| (false, vk::CompareOp::EQUAL)),
             cull: vk::CullModeFlags::NONE,
             formats: Some(formats),
@@ -93,7 +95,7 @@ impl Pipelines {
     }
 }
 
-/// The kinds of draws of a plan, resident geometry standing for streamed too.
+/// The kinds of draws of a plan. `Resident` stands for streamed geometry too.
 pub(super) fn draws(plan: &ScenePlan) -> impl Iterator<Item = (Source, Topology)> {
     let all = [Source::Lattice, Source::Resident]
         .into_iter()
@@ -102,21 +104,21 @@ pub(super) fn draws(plan: &ScenePlan) -> impl Iterator<Item = (Source, Topology)
     all.filter(move |&(source, topology)| stated.hold(source, topology))
 }
 
-/// What a terrain pipeline is for.
+/// The purpose of a terrain pipeline.
 #[derive(Clone, Copy)]
 pub(super) enum Pass {
-    /// A picture in these formats.
+    /// Draws a picture with these formats.
     Picture(Formats),
-    /// The vertices alone, to a buffer.
+    /// Writes vertices to a buffer, without fragments.
     Capture,
 }
 
-/// Whether such draws bring normals of their own.
+/// Returns true if vertex normals light draws of a source.
 fn lit_by_vertices(plan: &ScenePlan, source: Source) -> bool {
     plan.requirements.normals == Normals::Vertices && source != Source::Lattice
 }
 
-/// The vertex and the fragment program that draw such draws.
+/// Vertex and fragment shader of a source.
 fn programs(plan: &ScenePlan, source: Source) -> [&'static str; 2] {
     match source {
         Source::Lattice => ["lattice.vert", "terrain.frag"],
@@ -125,7 +127,7 @@ fn programs(plan: &ScenePlan, source: Source) -> [&'static str; 2] {
     }
 }
 
-/// Pipelines that a plan's pictures need, and instructions of their programs once the plan's constants are known.
+/// Number of pipelines of a plan's pictures, and of live instructions in their shaders under the plan's constants.
 pub fn size(plan: &ScenePlan) -> [usize; 2] {
     let values = Constants::of(plan);
     let sky = ["sky.vert", "sky.frag"];
@@ -134,7 +136,7 @@ pub fn size(plan: &ScenePlan) -> [usize; 2] {
     [draws(plan).count() + 1, instructions.sum()]
 }
 
-/// Makes the pipeline that runs such draws through their vertex program.
+/// Creates the pipeline of a pass for draws of a source and topology.
 pub(super) fn terrain(
     gpu: &Arc<Gpu>,
     layout: vk::PipelineLayout,
@@ -169,7 +171,7 @@ pub(super) fn terrain(
         }
         Pass::Capture => (capture, None, None),
     };
-    // Land is drawn first and hides; the far plane lies at depth 0.
+    // Reversed depth: the far plane lies at depth 0.
     let depth = formats.and_then(|formats| formats.depth).map(|_| (true, vk::CompareOp::GREATER));
     let description = Description {
         name,
@@ -215,7 +217,7 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
         .cull_mode(d.cull)
         .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
         .line_width(1.0)
-        // Without a fragment program only the vertex program's own writes matter.
+        // Capturing needs only the writes of the vertex shader.
         .rasterizer_discard_enable(fragment.is_none());
     let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
     let depth = vk::PipelineDepthStencilStateCreateInfo::default()
@@ -244,9 +246,9 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
         .dynamic_state(&dynamic)
         .layout(layout)
         .push_next(&mut rendering);
-    // SAFETY: all that the info points to lives here; modules may go once the pipeline is made.
+    // SAFETY: everything that the info points to is alive; modules may be destroyed once the pipeline exists.
     let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-    // SAFETY: no call uses the modules any more.
+    // SAFETY: nothing uses the modules any more.
     unsafe {
         gpu.raw.destroy_shader_module(vertex, None);
         fragment.into_iter().for_each(|module| gpu.raw.destroy_shader_module(module, None));
@@ -256,7 +258,7 @@ pub(super) fn make(gpu: &Arc<Gpu>, layout: vk::PipelineLayout, d: Description) -
     Ok(pipeline)
 }
 
-/// Makes a compute pipeline.
+/// Creates a compute pipeline.
 pub(super) fn compute(
     gpu: &Arc<Gpu>,
     layout: vk::PipelineLayout,
@@ -272,7 +274,7 @@ pub(super) fn compute(
         .name(c"main")
         .specialization_info(&special);
     let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-    // SAFETY: all that the info points to lives here; the module may go once the pipeline is made.
+    // SAFETY: everything that the info points to is alive; the module may be destroyed once the pipeline exists.
     let made = unsafe {
         let made = gpu.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None);
         gpu.raw.destroy_shader_module(module, None);
@@ -283,7 +285,7 @@ pub(super) fn compute(
     Ok(pipeline)
 }
 
-/// What distinguishes one pipeline from another.
+/// The differences between the graphics pipelines.
 pub(super) struct Description<'a> {
     pub name: &'static str,
     pub vertex: &'static str,
@@ -292,10 +294,10 @@ pub(super) struct Description<'a> {
     pub input: vk::PipelineVertexInputStateCreateInfo<'a>,
     pub topology: vk::PrimitiveTopology,
     pub wireframe: bool,
-    /// Whether it writes depth, and its test; `None`: there is no depth.
+    /// True if it writes depth, and its depth test; `None`: no depth buffer.
     pub depth: Option<(bool, vk::CompareOp)>,
     pub cull: vk::CullModeFlags,
-    /// The attachments; `None`: there are none.
+    /// Formats of the attachments; `None`: there are none.
     pub formats: Option<Formats>,
 }
 
@@ -334,7 +336,8 @@ fn vertex_input(source: Source) -> (u32, Vec<vk::VertexInputAttributeDescription
         (11, UINT, offset_of!(Instance, rotation)),
         (12, UINT, offset_of!(Instance, level)),
         (13, UINT, offset_of!(Instance, batch)),
-        (14, WEIGHTS, offset_of!(Instance, weights)),
+        (14, UINT, offset_of!(Instance, weights_kind)),
+        (15, WEIGHTS, offset_of!(Instance, weights_words)),
     ];
     let attributes = vertex.into_iter().map(attribute(0)).chain(instance.into_iter().map(attribute(1))).collect();
     (stride as u32, attributes)

@@ -1,4 +1,4 @@
-//! Runs `position.glsl` in a compute shader and reads the positions back, for comparison with its CPU twin.
+//! Runs `position.glsl` in a compute shader and reads the positions back, for comparison with the CPU reference.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ pub struct Query {
     pub explicit_height: u32,
 }
 
-/// What the device makes of a vertex. Laid out as `Answer` in `shaders/position.comp`.
+/// Position and normal of a vertex, computed on the device. Laid out as `Answer` in `shaders/position.comp`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Answer {
@@ -41,7 +41,7 @@ pub struct Answer {
     pub normal: [f32; 3],
 }
 
-/// Positions and normals as the device computes them.
+/// Computes the positions and normals of the queries on the device.
 pub fn answers(
     gpu: &Arc<Gpu>,
     plan: &ScenePlan,
@@ -64,9 +64,9 @@ pub fn answers(
         Bound::Storage(&input),
         Bound::Storage(&output),
     ];
-    let bindings = Bindings::new(gpu, "position twin", None, vk::ShaderStageFlags::COMPUTE, &bound, 0)?;
-    let pipeline = pipelines::compute(gpu, bindings.layout, "position twin", "position.comp", &Constants::of(plan))?;
-    // SAFETY: everything bound lives until `once` has waited; what is made here is destroyed after it.
+    let bindings = Bindings::new(gpu, "position check", None, vk::ShaderStageFlags::COMPUTE, &bound, 0)?;
+    let pipeline = pipelines::compute(gpu, bindings.layout, "position check", "position.comp", &Constants::of(plan))?;
+    // SAFETY: the resources live until `once` has waited; the pipeline is destroyed after that.
     unsafe {
         let ran = once(gpu, |r| {
             let point = vk::PipelineBindPoint::COMPUTE;

@@ -82,7 +82,7 @@ impl Slot {
     pub fn write(&mut self, frame: &Frame, list: &DrawList, part: &Part) {
         let before = &part.before;
         if part.is_first() {
-            let frame = Frame { fraction_bits: list.fraction_bits as i32, height_base: list.height_base, ..*frame };
+            let frame = Frame { vertices: list.vertex_format(), ..*frame };
             self.frame.write(0, bytemuck::bytes_of(&frame));
         }
         append(&mut self.instances, before.instances, &list.instances);

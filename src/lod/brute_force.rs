@@ -1,7 +1,9 @@
-//! Every sample of the field, in every view: the truth that the others are compared with.
+//! Brute force: draws every sample of the field in every view, as the ground truth for the other techniques.
 //!
-//! One static grid mesh, instanced over the field and displaced in the vertex program. Nothing is culled;
-//! only blocks of nothing but holes are left out.
+//! One static grid mesh is instanced over the field and displaced in the vertex shader. Nothing is culled; only blocks
+//! that consist of holes are omitted.
+//!
+//! Invariants: all of them, with error 0.
 
 use std::sync::Arc;
 
@@ -11,7 +13,7 @@ use crate::height::surface::has_terrain;
 use crate::height::{Field, MAX_SIDE, rtin};
 use crate::view::View;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "brute-force",
     about: "every sample, always: ground truth and baseline",
@@ -25,7 +27,7 @@ pub const ENTRY: Entry = Entry {
     build: |field, _: &Settings| Box::new(BruteForce::new(field)),
 };
 
-/// Cells along a side of the mesh. 64 keep its (65² vertices) transformed vertices in most GPUs' caches.
+/// Cells along a side of the mesh. With 64, the 65² transformed vertices fit most GPUs' caches.
 const CELLS: i32 = 64;
 
 struct BruteForce {

@@ -1,6 +1,6 @@
-//! The techniques: each a room behind the one door [`Technique`], all in the one table [`TECHNIQUES`].
+//! Level-of-detail techniques: each a module that implements [`Technique`] and has a row in [`TECHNIQUES`].
 //!
-//! Pure computation: no device, no file, no clock. Rooms never use each other.
+//! Pure computation without devices, files or clocks. Techniques never use each other.
 
 pub mod brute_force;
 pub mod budget;
@@ -18,79 +18,130 @@ use crate::height::Field;
 use crate::view::{Metric, Tolerance, View};
 pub use settings::{Need, Setting, Settings, Values};
 
-/// A way to choose what is drawn.
+/// A level-of-detail algorithm, prepared for one field.
+///
+/// These are the methods that every technique has. What only some can do is a trait of its own, which the technique
+/// returns from the method of the same name: [`SelectInParts`], [`SelectOnGpu`], [`Gradual`], [`Diagnostics`].
 pub trait Technique: Send {
     /// Geometry that stays in device-local memory.
     fn resident(&self) -> &Geometry;
 
-    /// The most that any list of this technique holds.
+    /// Upper bounds of the lists of this technique.
     fn limits(&self) -> Limits;
 
-    /// Fills the (empty) list with what this view needs.
+    /// Fills the (empty) list with the draws of a view.
     fn select(&mut self, view: &View, list: &mut DrawList);
 
-    /// Fills the (empty) list as [`Self::select`] does, and calls `ready` each time more draws of it may be drawn while
-    /// the rest is being selected: what stands in the list stays there as it is.
-    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, _ready: &mut dyn FnMut(&DrawList)) {
-        self.select(view, list);
-    }
-
-    /// How the device finds the draws itself, if it can: the same draws and instances as [`Self::select`], in any
-    /// order.
-    fn gpu_selection(&self) -> Option<&GpuSelection> {
-        None
-    }
-
-    /// What the device is told of a view ([`DrawList::parameters`]), where there is a driver. Its time does not
-    /// depend on what is drawn.
-    fn parameters(&self, _view: &View, _words: &mut Vec<u32>) {}
-
-    /// Fills the (empty) list with what the device is told of a view.
-    ///
-    /// # Panics
-    /// If the technique has no driver.
-    fn select_on_gpu(&mut self, view: &View, list: &mut DrawList) {
-        assert!(self.gpu_selection().is_some(), "a technique with a driver");
-        list.submission = Submission::GpuDriven;
-        self.parameters(view, &mut list.parameters);
-    }
-
-    /// What stays on the device.
-    fn device_geometry(&self) -> DeviceGeometry<'_> {
-        DeviceGeometry { geometry: self.resident(), limits: self.limits(), gpu_selection: self.gpu_selection() }
-    }
-
-    /// Whether the lists keep the view's tolerance under its metric.
+    /// True if the lists keep the view's tolerance under its metric.
     fn keeps_tolerance(&self) -> bool;
 
-    /// Whether another selection in the view of the last one gives the same list: nothing goes on gradually, and nothing
-    /// waits.
-    fn is_settled(&self) -> bool {
-        true
-    }
-
-    /// What its lists ask of the programs that draw them.
+    /// The pipelines that its lists need.
     fn pipeline_requirements(&self) -> PipelineRequirements {
         PipelineRequirements::default()
     }
 
-    /// What it could have prepared and did not, as this field makes no use of it.
+    /// Selection whose first draws are ready before the last ones.
+    fn in_parts(&mut self) -> Option<&mut dyn SelectInParts> {
+        None
+    }
+
+    /// Selection by compute shaders.
+    fn on_gpu(&self) -> Option<&dyn SelectOnGpu> {
+        None
+    }
+
+    /// Selection that takes several frames to reach its final state.
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        None
+    }
+
+    /// Facts about the prepared data.
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        None
+    }
+}
+
+/// A technique that hands out draws while it still selects others.
+pub trait SelectInParts {
+    /// Fills the (empty) list as [`Technique::select`] does. Calls `ready` whenever more draws are final: entries that
+    /// the list holds then do not change any more.
+    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList));
+}
+
+/// A technique whose selection runs on the device too.
+pub trait SelectOnGpu {
+    /// Tables and compute programs. They find the draws and instances of [`Technique::select`], in any order.
+    fn selection(&self) -> &GpuSelection;
+
+    /// Appends the shader parameters of a view ([`DrawList::parameters`]). Its time does not depend on the number of
+    /// draws.
+    fn parameters(&self, view: &View, words: &mut Vec<u32>);
+}
+
+/// A technique that changes levels over several frames.
+pub trait Gradual {
+    /// True if another selection in the last view gives the same list: no transition is running and no change is
+    /// queued.
+    fn is_settled(&self) -> bool;
+}
+
+/// A technique that reports on the data it prepared.
+pub trait Diagnostics {
+    /// Data that it left out because this field makes no use of it.
     fn omitted(&self) -> Vec<Omitted> {
         Vec::new()
     }
 
-    /// What is worth knowing about the data it prepared: name, value, unit.
-    fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
-        Vec::new()
+    /// Statistics: name, value, unit.
+    fn stats(&self) -> Vec<(&'static str, f64, &'static str)>;
+}
+
+impl dyn Technique + '_ {
+    /// Fills the (empty) list, in parts where the technique can. See [`SelectInParts::select_in_parts`].
+    pub fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
+        match self.in_parts() {
+            Some(parts) => parts.select_in_parts(view, list, ready),
+            None => self.select(view, list),
+        }
+    }
+
+    /// Fills the (empty) list with the parameters of a selection on the device.
+    ///
+    /// # Panics
+    /// If the technique cannot select there.
+    pub fn select_on_gpu(&mut self, view: &View, list: &mut DrawList) {
+        list.submission = Submission::GpuDriven;
+        self.on_gpu().expect("a technique that selects on the GPU").parameters(view, &mut list.parameters);
+    }
+
+    /// The data that stays on the device.
+    pub fn device_geometry(&self) -> DeviceGeometry<'_> {
+        let gpu_selection = self.on_gpu().map(SelectOnGpu::selection);
+        DeviceGeometry { geometry: self.resident(), limits: self.limits(), gpu_selection }
+    }
+
+    /// True unless a gradual technique is still changing levels. See [`Gradual::is_settled`].
+    pub fn is_settled(&self) -> bool {
+        self.gradual().is_none_or(Gradual::is_settled)
+    }
+
+    /// See [`Diagnostics::omitted`].
+    pub fn omitted(&self) -> Vec<Omitted> {
+        self.diagnostics().map(Diagnostics::omitted).unwrap_or_default()
+    }
+
+    /// See [`Diagnostics::stats`].
+    pub fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
+        self.diagnostics().map(Diagnostics::stats).unwrap_or_default()
     }
 }
 
 /// Something that a technique did not prepare.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Omitted {
-    /// What it is.
+    /// Its name.
     pub what: &'static str,
-    /// Why nothing uses it.
+    /// The reason why nothing uses it.
     pub reason: String,
     /// Device bytes that it would have taken.
     pub bytes: u64,
@@ -111,26 +162,29 @@ pub struct Entry {
     pub name: &'static str,
     /// One line.
     pub about: &'static str,
-    /// Where it was published.
+    /// Publication it implements.
     pub paper: &'static str,
     /// Forms beside the default one.
     pub variants: &'static [Variant],
-    /// What can be set, with defaults.
+    /// Settings with their defaults.
     pub settings: &'static [Setting],
-    /// Which of them do nothing beside some words of others.
+    /// Settings that have no effect beside some values of others.
     pub needs: &'static [Need],
-    /// The most samples of a field, tiling included: it keeps something of each of them, or goes through them in a frame.
+    /// Maximum number of samples of a field, tiling included. Memory or time per frame grow with it.
     pub max_samples: u64,
-    /// The most samples along a side of a field, tiling included.
+    /// Maximum number of samples along a side of a field, tiling included.
     pub max_side: u32,
-    /// Whether it takes a land without samples ([`Field::procedural`]).
+    /// True if it can draw terrain without samples ([`Field::procedural`]).
     pub takes_endless: bool,
-    /// Prepares the technique for a field of at most so many.
+    /// Prepares the technique for a field within these limits.
     pub build: fn(Arc<Field>, &Settings) -> Box<dyn Technique>,
 }
 
 impl Entry {
-    /// The technique prepared for a field, or why not.
+    /// Prepares the technique for a field.
+    ///
+    /// # Errors
+    /// If the technique cannot draw the field.
     pub fn prepare(&self, field: &Arc<Field>, settings: &Settings) -> Result<Box<dyn Technique>, String> {
         let [w, h] = field.size().map(u64::from);
         let Self { name, max_samples, .. } = self;
@@ -151,7 +205,7 @@ impl Entry {
     }
 }
 
-/// Every technique. The table feeds the command line, the viewer's keys, the laws, the golden pictures, the
+/// All techniques. The table feeds the command line, the viewer's keys, the invariants, the golden pictures, the
 /// benchmarks and the reports.
 pub const TECHNIQUES: &[Entry] = &[
     brute_force::ENTRY,
@@ -162,14 +216,14 @@ pub const TECHNIQUES: &[Entry] = &[
     clusters::ENTRY,
 ];
 
-/// What a tolerance is multiplied by until a list fits.
+/// Factor by which a tolerance grows until a list fits.
 const SCALE_STEP: f64 = 1.5;
 
 /// Retries `select` with a growing tolerance until its list fits. Returns the result and the scale of the tolerance.
 ///
-/// A wider tolerance never draws more, so that the search skips steps: the view's tolerance may be a hundred powers of ten
-/// too fine. The last call is that of the result. Under the certified metric terrain stays in front of the eye at any
-/// finite tolerance, which may always be too much: then the scale is infinite, and the paper's metric decides.
+/// A wider tolerance never draws more. The search doubles its steps, then bisects, because the view's tolerance may be
+/// a hundred powers of ten too fine. The last call of `select` is that of the result. If no finite tolerance fits under
+/// the certified metric, the paper's metric is tried; the scale is infinite then.
 ///
 /// # Panics
 /// If `select` makes nothing under an infinite tolerance.
@@ -185,7 +239,7 @@ pub(crate) fn select_within_limits<T>(view: &View, mut select: impl FnMut(&View)
     (selected.expect("nothing is too much where no tolerance is kept"), f64::INFINITY)
 }
 
-/// The same among finite tolerances of the view's metric; `None` if none fits.
+/// Searches the finite tolerances of the view's metric. `None` if none fits.
 fn first_that_fits<T>(view: &View, select: &mut impl FnMut(&View) -> Option<T>) -> Option<(T, f64)> {
     if let Some(selected) = select(view) {
         return Some((selected, 1.0));

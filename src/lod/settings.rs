@@ -1,9 +1,9 @@
-//! What can be set on a technique: declared in its room, checked here once, read without failure.
+//! Settings of techniques: declared by each technique, validated once, then read without errors.
 
 use super::Entry;
 use crate::height::progress::Progress;
 
-/// What a setting may be.
+/// Allowed values of a setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Values {
     /// One of these words.
@@ -12,41 +12,44 @@ pub enum Values {
     Number(f64, f64),
 }
 
-/// A setting: `--set key=value`.
+/// A setting, given as `--set key=value`.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
     /// Its key.
     pub key: &'static str,
-    /// What it may be.
+    /// Allowed values.
     pub values: Values,
-    /// What it is unless set.
+    /// Default value.
     pub default: &'static str,
-    /// One line.
+    /// Description, one line.
     pub about: &'static str,
 }
 
-/// A setting that does something only where another one is one of these words.
+/// A setting that has an effect only if another setting has one of these words.
 #[derive(Clone, Copy, Debug)]
 pub struct Need {
     /// Its key.
     pub key: &'static str,
-    /// The other's.
+    /// Key of the other setting.
     pub other: &'static str,
-    /// The other's words.
+    /// Words of the other setting.
     pub words: &'static [&'static str],
 }
 
-/// A variant and values for all settings of one technique.
+/// A variant, and values for all settings of one technique.
 #[derive(Clone, Debug)]
 pub struct Settings {
     variant: Option<&'static str>,
     values: Vec<(&'static Setting, String)>,
-    /// How far the room has come with its preparation, if it says so.
+    /// Progress of the technique's preparation, if it reports any.
     pub progress: Progress,
 }
 
 impl Settings {
-    /// The settings of `entry`, `choices` put over the defaults. The error names what is allowed.
+    /// Applies `choices` to the defaults of `entry`.
+    ///
+    /// # Errors
+    /// Returns the allowed values if the variant, a key or a value is unknown.
     pub fn new(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Self, String> {
         let variant = match variant {
             None => None,
@@ -67,13 +70,13 @@ impl Settings {
         Ok(Self { variant: variant.map(|v| v.name), values, progress: Progress::default() })
     }
 
-    /// The defaults of `entry`.
+    /// Returns the defaults of `entry`.
     pub fn defaults(entry: &Entry) -> Self {
         let values = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
         Self { variant: None, values, progress: Progress::default() }
     }
 
-    /// The settings on `entry` that do nothing beside the others, a line each.
+    /// Returns the settings that have no effect beside the others, one line each.
     pub fn idle(&self, entry: &Entry) -> Vec<String> {
         let is_set = |key: &str| self.values.iter().any(|(s, value)| s.key == key && value != s.default);
         let is_idle = |need: &&Need| is_set(need.key) && !need.words.contains(&self.word(need.other));
@@ -84,25 +87,25 @@ impl Settings {
         entry.needs.iter().filter(is_idle).map(line).collect()
     }
 
-    /// The variant chosen, if not the default one.
+    /// Returns the chosen variant; `None` for the default one.
     pub fn variant(&self) -> Option<&'static str> {
         self.variant
     }
 
-    /// The value of a setting as a word.
+    /// Returns the value of a setting as a word.
     ///
     /// # Panics
-    /// If the room did not declare the key.
+    /// If the technique did not declare the key.
     pub fn word(&self, key: &str) -> &str {
-        &self.values.iter().find(|(s, _)| s.key == key).expect("a declared key").1
+        &self.values.iter().find(|(s, _)| s.key == key).expect("a declared setting").1
     }
 
-    /// The value of a setting as a number.
+    /// Returns the value of a setting as a number.
     ///
     /// # Panics
-    /// If the room did not declare the key as a number.
+    /// If the technique did not declare the key as a number.
     pub fn number(&self, key: &str) -> f64 {
-        self.word(key).parse().expect("checked on entry")
+        self.word(key).parse().expect("a number validated by `Settings::new`")
     }
 }
 

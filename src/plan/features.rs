@@ -1,6 +1,5 @@
-//! The features of a plan: when each is kept and why, what it takes, and how it is forced.
+//! The table of features: condition, reason and memory of each, and the ways to force it.
 
-use super::look::Colour;
 use super::{Decision, ScenePlan};
 use crate::draw::layout::{ExplicitVertex, VertexNormals};
 use crate::draw::{DepthMode, DeviceGeometry, Geometry, Limits, Morph, Normals, Seams};
@@ -12,25 +11,25 @@ pub struct Feature {
     /// Its name.
     pub name: &'static str,
     is_kept: fn(&ScenePlan, &DeviceGeometry) -> bool,
-    /// Why it is kept.
+    /// Reason if it is kept.
     kept: &'static str,
-    /// Why it is left out.
+    /// Reason if it is omitted.
     left_out: &'static str,
-    /// Whether it is the technique that needs it, not the scene.
+    /// True if the technique needs it, not the scene.
     by_technique: bool,
     /// Device bytes that it takes.
     bytes: fn(&ScenePlan, &DeviceGeometry) -> u64,
-    /// How it is kept or left out by hand.
+    /// Ways to force it by hand.
     pub(super) force: Force,
 }
 
-/// How a feature is kept or left out by hand.
+/// The ways to force a feature by hand.
 pub(super) enum Force {
-    /// Not at all: why.
+    /// None, for this reason.
     Never(&'static str),
-    /// It can be kept where nothing needs it.
+    /// Keep it where nothing needs it.
     In(fn(&mut ScenePlan)),
-    /// It can be left out too; the picture may change then.
+    /// Keep or omit it. Omitting may change the picture.
     Either(fn(&mut ScenePlan, bool)),
 }
 
@@ -208,7 +207,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "overlay",
-        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_none(),
+        is_kept: |plan, _| plan.colour.shows_overlay() && plan.maps.is_none(),
         kept: "asked for",
         left_out: "no picture is laid over as a whole",
         by_technique: false,
@@ -217,7 +216,7 @@ pub const FEATURES: &[Feature] = &[
     },
     Feature {
         name: "texture maps",
-        is_kept: |plan, _| plan.shows_picture() && plan.maps.is_some(),
+        is_kept: |plan, _| plan.colour.shows_overlay() && plan.maps.is_some(),
         kept: "the picture exceeds the memory for it, or one image",
         left_out: "no picture exceeds the memory for it",
         by_technique: false,
@@ -262,7 +261,7 @@ pub const FEATURES: &[Feature] = &[
     },
 ];
 
-/// Bytes of a picture of this size and its mipmap levels.
+/// Bytes of a picture of this size (texels) with its mipmap levels.
 pub(super) fn overlay_bytes(size: [u32; 2]) -> u64 {
     (0..mip_levels(size)).map(|level| size.map(|n| u64::from((n >> level).max(1)))).map(|[w, h]| 4 * w * h).sum()
 }
@@ -277,7 +276,7 @@ fn none(_: &ScenePlan, _: &DeviceGeometry) -> u64 {
 }
 
 impl Feature {
-    /// Whether it can be kept, or left out, by hand.
+    /// Returns true if it can be kept (or omitted) by hand.
     pub fn can_be(&self, kept: bool) -> bool {
         match self.force {
             Force::Never(_) => false,
@@ -286,7 +285,7 @@ impl Feature {
         }
     }
 
-    /// Keeps it in a plan, or leaves it out, if that can be.
+    /// Keeps it in a plan or omits it, if it can be forced so.
     pub(super) fn force(&self, plan: &mut ScenePlan, keep: bool) {
         match self.force {
             Force::Either(force) => force(plan, keep),
@@ -309,12 +308,7 @@ impl Feature {
 }
 
 impl ScenePlan {
-    fn shows_picture(&self) -> bool {
-        matches!(self.colour, Colour::Overlay | Colour::Maps)
-    }
-
-    /// What is kept and what is left out, in that order, for a technique that keeps this on the device; without one
-    /// only what the scene decides.
+    /// The kept features, then the omitted ones. Without the geometry of a technique, only those that the scene decides.
     pub fn decisions(&self, field: &Field, technique: Option<&DeviceGeometry>) -> (Vec<Decision>, Vec<Decision>) {
         let nothing = DeviceGeometry { geometry: &Geometry::default(), limits: Limits::default(), gpu_selection: None };
         let kept = technique.unwrap_or(&nothing);
@@ -330,17 +324,16 @@ impl ScenePlan {
 mod tests {
     use super::*;
     use crate::height::{Holes, Samples};
-    use crate::plan::{DeviceLimits, Look};
+    use crate::plan::{Colour, DeviceLimits, Look};
 
-    /// A picture is there as a whole where that fits, in parts where it does not, and either says why.
+    /// An overlay is one texture if it fits, else a virtual texture, with a reason each time.
     #[test]
-    fn a_picture_is_there_once() {
+    fn an_overlay_is_either_whole_or_virtual() {
         let field = Field::new(Samples::F32(vec![0.0; 65 * 65]), [65, 65], [1.0; 2], Holes::none(65 * 65));
         let device = DeviceLimits { image_side: 4096, image_layers: 256, filters_heights: true };
         let reasons = |size: Option<[u32; 2]>, texture_bytes: u64| {
             let look = Look { colour: Colour::Overlay, texture_bytes, ..Look::default() };
-            let plan = ScenePlan::new(&field, &look, &device).unwrap();
-            let plan = plan.with_overlay(&field, &look, &device, size)?;
+            let plan = ScenePlan::builder(&field, &look, &device).overlay(size).build()?;
             let (kept, left_out) = plan.decisions(&field, None);
             let is_of_picture = |d: &&Decision| ["overlay", "texture maps"].contains(&d.feature);
             assert_eq!(kept.iter().chain(&left_out).filter(is_of_picture).count(), 2);

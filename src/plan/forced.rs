@@ -1,23 +1,26 @@
-//! Features that are kept or left out by hand, to see what they cost.
+//! Features that are kept or omitted by hand, to measure their cost.
 
 use super::features::{FEATURES, Feature, Force};
 
-/// Which features are forced; nothing by default.
+/// The set of forced features; empty by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Forced {
     /// Bit k: feature k of [`FEATURES`] is kept.
     kept: u32,
-    /// Bit k: it is left out.
+    /// Bit k: feature k is omitted.
     left_out: u32,
 }
 
-/// A feature's name as it is written on the command line.
+/// A feature's name on the command line.
 pub fn word(feature: &Feature) -> String {
     feature.name.replace(' ', "-")
 }
 
 impl Forced {
-    /// The same with one feature more, by its [`word`], that is kept or left out; or why not.
+    /// The set with one more feature, named by its [`word`].
+    ///
+    /// # Errors
+    /// If there is no such feature, it cannot be forced so, or it is forced already.
     pub fn with(self, name: &str, keep: bool) -> Result<Self, String> {
         let Some(k) = FEATURES.iter().position(|feature| word(feature) == name) else {
             let known: Vec<_> = FEATURES.iter().filter(|f| f.can_be(true) || f.can_be(false)).map(word).collect();
@@ -39,14 +42,14 @@ impl Forced {
         Ok(if keep { Self { kept: self.kept | bit, ..self } } else { Self { left_out: self.left_out | bit, ..self } })
     }
 
-    /// Each forced feature, and whether it is kept.
+    /// Each forced feature, with true if it is kept.
     pub(super) fn each(self) -> impl Iterator<Item = (&'static Feature, bool)> {
         let is = |bits: u32, k: usize| bits >> k & 1 == 1;
         let state = move |k: usize| if is(self.kept, k) { Some(true) } else { is(self.left_out, k).then_some(false) };
         FEATURES.iter().enumerate().filter_map(move |(k, feature)| Some((feature, state(k)?)))
     }
 
-    /// Whether this feature is.
+    /// Returns true if this feature is forced.
     pub(super) fn has(self, feature: &Feature) -> bool {
         self.each().any(|(forced, _)| forced.name == feature.name)
     }

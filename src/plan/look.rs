@@ -1,67 +1,35 @@
-//! How the land is to look, and what a frame needs for it.
+//! The appearance of the terrain, and the shader constants of a frame.
 
 use glam::DVec3;
 
+use super::colour::Colour;
 use super::features::overlay_bytes;
 use super::forced::Forced;
-use crate::draw::layout::Frame;
+use crate::draw::layout::{Frame, Lighting, SurfaceTextures};
 use crate::height::Field;
 use crate::texture::drape::Drape;
-use crate::view::{Lens, View};
+use crate::view::View;
 
-/// What a fragment's colour says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Colour {
-    /// Hypsometric tint.
-    #[default]
-    Height = 0,
-    /// Level of detail.
-    Level = 1,
-    /// A picture laid over the field.
-    Overlay = 2,
-    /// Distance of the drawn surface from the samples' own, in pixels.
-    Error = 3,
-    /// Surface normal.
-    Normal = 4,
-    /// Draw.
-    Batch = 5,
-    /// Which map of the picture, where that is there in parts: its level, and where it ends.
-    Maps = 6,
-    /// A ground whose texels are made where they are seen ([`ground`](crate::texture::ground)).
-    Ground = 7,
-    /// Which node of the ground's map serves: its level, and where it ends.
-    Nodes = 8,
-}
-
-impl Colour {
-    /// Whether texels of the ground are needed for it.
-    pub fn shows_ground(self) -> bool {
-        matches!(self, Colour::Ground | Colour::Nodes)
-    }
-}
-
-/// How the land is to look.
+/// The appearance of the terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// What the colours say.
+    /// The quantity that colours show.
     pub colour: Colour,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
     pub sun: [f64; 2],
     /// Optical density of the fog, per metre; 0: no fog.
     pub fog: f64,
-    /// Edges only.
+    /// Triangles are drawn as edges.
     pub wireframe: bool,
-    /// The ground's materials are seen from near, under the tint and the overlay.
+    /// Detail textures cover the ground, under the tint and the overlay.
     pub detail: bool,
-    /// How fast the sun goes on in azimuth, degrees a second.
+    /// Change of the sun's azimuth, degrees per second.
     pub sun_speed: f64,
-    /// The most bytes for a picture laid over the field, or for the texels of the ground: what is larger is there in parts,
-    /// as fine as a view needs.
+    /// Memory budget of the overlay, or of the virtual ground, bytes. A larger picture becomes a virtual texture.
     pub texture_bytes: u64,
-    /// Where a picture lies over the field; `None`: over all of it.
+    /// Position of the overlay on the field; `None`: it covers the field.
     pub drape: Option<Drape>,
-    /// Features that are kept or left out whatever the scene needs.
+    /// Features that are kept or omitted whatever the scene needs.
     pub forced: Forced,
 }
 
@@ -82,17 +50,17 @@ impl Default for Look {
 }
 
 impl Look {
-    /// Whether a picture of so many texels is within its bytes.
+    /// Returns true if a picture of this size (texels) is within the memory budget.
     pub fn holds(&self, size: [u32; 2]) -> bool {
         overlay_bytes(size) <= self.texture_bytes
     }
 
-    /// The place of a picture over a field.
+    /// Position of the overlay on a field.
     pub fn drape_over(&self, field: &Field) -> Drape {
         self.drape.unwrap_or_else(|| Drape::over(field))
     }
 
-    /// The look so many seconds later.
+    /// The look after some seconds: the sun has moved.
     pub fn after(&self, seconds: f64) -> Look {
         let [azimuth, altitude] = self.sun;
         Look { sun: [(azimuth + self.sun_speed * seconds).rem_euclid(360.0), altitude], ..*self }
@@ -104,35 +72,37 @@ impl Look {
         DVec3::new(azimuth.sin() * altitude.cos(), altitude.sin(), -azimuth.cos() * altitude.cos())
     }
 
-    /// All that a frame needs for this view of the field; `range` is the tint's, metres.
+    /// The shader constants of a view of the field. `range`: lowest and highest sample, metres.
     pub fn frame(&self, field: &Field, view: &View, range: [f32; 2]) -> Frame {
-        let (slope, size) = match view.lens {
-            Lens::Perspective { .. } => (1.0 / view.focal_px(), 0.0),
-            Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
-        };
         let placing = Frame::placing(field, view);
-        let overlay = self.drape_over(field).shares(placing.render_origin);
-        let repeats = |k: usize| Repeats::new(placing.render_origin[k], field.spacing[k]);
         Frame {
-            height_range: tinted_range(field, range),
-            lamp_reach: lamp_reach(field, view.eye, range),
-            sun: self.towards_sun().as_vec3().to_array(),
-            fog_density: self.fog as f32,
+            lighting: Lighting {
+                sun: self.towards_sun().as_vec3().to_array(),
+                fog_density: self.fog as f32,
+                lamp_reach: lamp_reach(field, view.eye, range),
+                tint_range: tinted_range(field, range),
+            },
+            textures: self.textures(field, placing.camera.origin.at),
+            ..placing
+        }
+    }
+
+    fn textures(&self, field: &Field, render_origin: [i32; 2]) -> SurfaceTextures {
+        let overlay = self.drape_over(field).shares(render_origin);
+        let repeats = |k: usize| Repeats::new(render_origin[k], field.spacing[k]);
+        SurfaceTextures {
             detail_first: [0, 1].map(|k| repeats(k).first),
             detail_scale: [0, 1].map(|k| repeats(k).scale),
             overlay_first: overlay.first,
             overlay_scale: overlay.scale,
             overlay_period: overlay.period,
             overlay_start: overlay.start,
-            pixel_slope: slope as f32,
-            pixel_size: size as f32,
-            ..placing
         }
     }
 }
 
-/// How far a lamp at the eye reaches in a cave whose heights have this range, metres: about as far as the cave is high, and
-/// to the cave from outside.
+/// Reach of the lamp in a cave whose heights have this range, metres: about the height of the cave, and from outside the
+/// distance to the cave too.
 fn lamp_reach(field: &Field, eye: DVec3, range: [f32; 2]) -> f32 {
     let [low, high] = range.map(f64::from);
     let [east, south] = field.size().map(|n| f64::from(n) - 1.0);
@@ -141,16 +111,16 @@ fn lamp_reach(field: &Field, eye: DVec3, range: [f32; 2]) -> f32 {
     (0.7 * (high - low) + 2.0 * away) as f32
 }
 
-/// How far materials reach along an axis before they repeat, about, metres.
+/// Approximate period of the detail textures along an axis, metres.
 const PERIOD_M: f64 = 4096.0;
 
-/// The materials' repetition along an axis of the lattice: after a power of two of samples, or so many times a sample.
-/// Thus the anchor's place in it is exact wherever the anchor is, and from one anchor to another nothing moves.
+/// Repetition of the detail textures along an axis of the lattice. The period is a power of two of samples, or a power of
+/// two of periods make a sample. The position of any render origin in the period is therefore exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Repeats {
-    /// Where the anchor lies in it, samples.
+    /// Position of the render origin in the period, samples.
     first: f32,
-    /// Repetitions a sample.
+    /// Periods per sample.
     scale: f32,
 }
 
@@ -162,8 +132,8 @@ impl Repeats {
     }
 }
 
-/// The ends of the tint: the range of heights, or more where that is too little beside the field's length for heights
-/// that are reconstructed in single precision.
+/// The range of the tint, metres. It exceeds a range of heights that is too small, beside the field's length, for heights
+/// reconstructed in single precision.
 fn tinted_range(field: &Field, [low, high]: [f32; 2]) -> [f32; 2] {
     let length_m = (0..2).map(|k| f64::from(field.size()[k]) * field.spacing[k]).fold(0.0, f64::max);
     let min_m = 1e-5 * length_m.min(1e9).max(f64::from(low.abs().max(high.abs())));
@@ -178,7 +148,7 @@ mod tests {
     fn materials_repeat_alike_from_every_render_origin() {
         for spacing in [0.001, 0.3, 1.0, 20.0, 30.7, 512.0, 9000.0, 1e5] {
             let scale = Repeats::new(0, spacing).scale;
-            // A place some samples from one anchor is the same place as that many more from another one.
+            // The same position relative to two render origins has the same phase.
             for render_origin in [-3, 0, 1, 77, 499_773, 1 << 29] {
                 let at = |render_origin: i32, along: i32| {
                     let Repeats { first, scale } = Repeats::new(render_origin, spacing);
@@ -192,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sun_goes_on() {
+    fn the_sun_moves() {
         let look = Look { sun: [350.0, 30.0], sun_speed: 15.0, ..Look::default() };
         assert_eq!(look.after(2.0).sun, [20.0, 30.0]);
         assert_eq!(look.after(0.0), look);

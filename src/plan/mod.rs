@@ -1,80 +1,86 @@
-//! What a scene needs, and therefore what is left out: worked out before anything is made on the device, and
-//! everything on the device is made from it alone.
+//! The plan of a scene: the features it needs, and those that are omitted.
+//!
+//! It is made before any object on the device, and alone decides which objects exist.
 
+mod builder;
+mod colour;
+mod constants;
 pub mod features;
 pub mod forced;
 mod look;
 
-use crate::draw::{DepthMode, DrawKinds, PipelineRequirements};
-use crate::height::{Field, Samples};
+use crate::draw::{DepthMode, DrawKinds, Morph, PipelineRequirements, Seams};
 use crate::texture::drape::Drape;
 use crate::texture::virtual_ground::VirtualGroundLayout;
 use crate::texture::virtual_overlay::VirtualTextureLayout;
+pub use builder::ScenePlanBuilder;
+pub use colour::Colour;
+pub use constants::SceneConstants;
 pub use features::{FEATURES, Feature, mip_levels};
 pub use forced::Forced;
-pub use look::{Colour, Look};
+pub use look::Look;
 
-/// What the device allows, as far as the plan depends on it.
+/// The limits of a device on which plans depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceLimits {
-    /// Largest side of a 2D image.
+    /// Maximum side of a 2D image, texels.
     pub image_side: u32,
-    /// Most layers of an image.
+    /// Maximum number of layers of an image.
     pub image_layers: u32,
-    /// Whether height textures can be filtered linearly.
+    /// True if samplers can filter height textures linearly.
     pub filters_heights: bool,
 }
 
-/// The features of one scene's pipelines and resources.
+/// The features of a scene's pipelines and resources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePlan {
-    /// 16-bit heights stay 16-bit.
+    /// The height texture holds 16-bit codes.
     pub coded: bool,
     /// The field repeats.
     pub tiled: bool,
     /// Some samples have no data.
     pub holes: bool,
-    /// A ceiling lies over the field: its heights are there, and a lamp at the eye lights both.
+    /// A ceiling lies over the field: a second height texture, and a lamp at the eye.
     pub ceiling: bool,
     /// Fog is computed.
     pub fog: bool,
-    /// What colours say; `Overlay` keeps a picture.
+    /// The quantity that colours show.
     pub colour: Colour,
-    /// Edges only.
+    /// Triangles are drawn as edges.
     pub wireframe: bool,
     /// Side of a page of the height texture as a power of two; 0: one page holds the whole field.
     pub page_shift: u32,
-    /// Normals filter heights with the device's sampler.
+    /// The device's sampler filters heights for normals.
     pub filtered: bool,
-    /// What the technique's lists ask for.
+    /// The pipelines that the technique's lists need.
     pub requirements: PipelineRequirements,
-    /// The draws that there are programs for.
+    /// The kinds of draws that have pipelines.
     pub draws: DrawKinds,
-    /// The ground's materials are there, and looked up.
+    /// Detail textures cover the ground.
     pub detail: bool,
-    /// Timestamps and pipeline statistics are taken.
+    /// Timestamp and pipeline statistics queries run.
     pub measured: bool,
     /// Pictures go to a window.
     pub windowed: bool,
-    /// Samples stored along (x, z).
+    /// Number of samples stored along (x, z).
     pub stored: [u32; 2],
-    /// Texels of the picture that may be laid over (x, z).
+    /// Size of the overlay picture, texels (x, z).
     pub overlay: Option<[u32; 2]>,
-    /// How it is cut where it is there in parts.
+    /// Layout of the overlay as a virtual texture, if it is one.
     pub maps: Option<VirtualTextureLayout>,
-    /// Where it lies over the field.
+    /// Position of the overlay on the field.
     pub drape: Drape,
-    /// How texels of the ground are kept, if they are asked for.
+    /// Layout of the virtual ground, if colours show it.
     pub ground: Option<VirtualGroundLayout>,
-    /// What was kept and left out by hand.
+    /// Features that were kept or omitted by hand.
     pub forced: Forced,
 }
 
-/// Pages of fewer samples a side than 2^4 are not worth their lookup.
+/// Smallest side of a page as a power of two: smaller pages cost more in lookups than they save.
 const MIN_PAGE_SHIFT: u32 = 4;
 
-/// The side of a page of the height texture as a power of two: the largest whose pages hold at most an eighth more texels
-/// than samples or, where none does, that with the fewest texels. 0: one image holds all samples.
+/// The side of a page of the height texture as a power of two; 0: one image holds all samples. The largest side whose
+/// pages hold at most an eighth more texels than samples, or else the side with the fewest texels.
 fn page_shift(stored: [u32; 2], device: &DeviceLimits) -> u32 {
     if stored.iter().all(|&n| n <= device.image_side) {
         return 0;
@@ -88,68 +94,33 @@ fn page_shift(stored: [u32; 2], device: &DeviceLimits) -> u32 {
     tight.or_else(|| shifts().min_by_key(|&shift| texels(shift))).unwrap_or(largest)
 }
 
-/// One feature of a plan and what became of it.
+/// A feature that a plan keeps or omits.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Decision {
-    /// What it is.
+    /// Its name.
     pub feature: &'static str,
-    /// Why it is kept or left out.
+    /// The reason.
     pub reason: String,
-    /// Device bytes that leaving it out saves, or that it takes.
+    /// Device bytes that it takes, or that omitting it saves.
     pub bytes: u64,
 }
 
 impl ScenePlan {
-    /// The plan for a field and a look, or which limit of the device the field exceeds, or that its bytes do not hold the
-    /// few parts of the ground that there must be.
-    pub fn new(field: &Field, look: &Look, device: &DeviceLimits) -> Result<Self, String> {
-        let (stored, is_endless) = (field.stored(), field.procedural().is_some());
-        let page_shift = page_shift(stored, device);
-        let mut plan = Self {
-            coded: matches!(field.samples(), Samples::Coded { .. }),
-            tiled: field.is_tiled(),
-            holes: field.holes().count() > 0,
-            ceiling: field.ceiling().is_some(),
-            fog: look.fog > 0.0,
-            // Without samples there is nothing to be compared with.
-            colour: if is_endless && look.colour == Colour::Error { Colour::Height } else { look.colour },
-            wireframe: look.wireframe,
-            page_shift,
-            filtered: device.filters_heights && page_shift == 0,
-            requirements: PipelineRequirements::default(),
-            draws: PipelineRequirements::default().draws,
-            detail: look.detail,
-            measured: true,
-            windowed: false,
-            stored,
-            overlay: None,
-            maps: None,
-            drape: look.drape_over(field),
-            ground: None,
-            forced: look.forced,
-        };
-        plan.force();
-        if look.colour.shows_ground() {
-            plan.ground = Some(VirtualGroundLayout::new(field, look.texture_bytes, device.image_layers)?);
-        }
-        let layers = plan.pages()[0] * plan.pages()[1];
-        if layers > device.image_layers {
-            return Err(format!(
-                "{} x {} samples need {layers} pages of {}²: maxImageArrayLayers is {}",
-                stored[0],
-                stored[1],
-                plan.page_size()[0],
-                device.image_layers
-            ));
-        }
-        Ok(plan)
-    }
-
-    /// The plan for a technique whose lists ask for this.
-    pub fn with_requirements(self, requirements: PipelineRequirements) -> Self {
-        let mut plan = Self { requirements, draws: requirements.draws, ..self };
+    /// The plan of the same scene for another technique.
+    pub fn with_requirements(&self, requirements: PipelineRequirements) -> Self {
+        let mut plan = Self { requirements, draws: requirements.draws, ..self.clone() };
         plan.force();
         plan
+    }
+
+    fn check_layers(&self, limits: &DeviceLimits) -> Result<(), String> {
+        let layers = self.pages()[0] * self.pages()[1];
+        if layers <= limits.image_layers {
+            return Ok(());
+        }
+        let ([x, z], [side, _]) = (self.stored, self.page_size());
+        let available = limits.image_layers;
+        Err(format!("{x} x {z} samples need {layers} pages of {side}²: maxImageArrayLayers is {available}"))
     }
 
     fn force(&mut self) {
@@ -158,8 +129,10 @@ impl ScenePlan {
         }
     }
 
-    /// The same plan with one feature kept whether it is needed or not, by its [`word`](forced::word); or why that
-    /// cannot be.
+    /// The plan with one more feature, named by its [`word`](forced::word), whether the scene needs it or not.
+    ///
+    /// # Errors
+    /// If there is no such feature, or it cannot be forced.
     pub fn keeping(&self, name: &str) -> Result<Self, String> {
         let mut plan = self.clone();
         for (feature, keep) in Forced::default().with(name, true)?.each() {
@@ -168,7 +141,7 @@ impl ScenePlan {
         Ok(plan)
     }
 
-    /// Heights in several pages although one would hold them, half as long as the longer side or shorter.
+    /// Cuts heights that fit one page into pages at most half as long as the field's longer side.
     fn cut_into_pages(&mut self) {
         let longest = self.stored[0].max(self.stored[1]).max(4);
         if self.page_shift == 0 {
@@ -177,49 +150,52 @@ impl ScenePlan {
         }
     }
 
-    /// The plan with a picture of so many texels laid over the field: in parts where it exceeds the look's bytes or one
-    /// image, and the field has samples.
-    ///
-    /// # Errors
-    /// If the bytes do not hold the few parts that there must be.
-    pub fn with_overlay(
-        mut self,
-        field: &Field,
-        look: &Look,
-        device: &DeviceLimits,
-        overlay: Option<[u32; 2]>,
-    ) -> Result<Self, String> {
-        self.overlay = overlay;
-        let is_whole = |size: &[u32; 2]| look.holds(*size) && size.iter().all(|&n| n <= device.image_side);
-        if let Some(size) = overlay.filter(|size| field.procedural().is_none() && !is_whole(size)) {
-            self.maps =
-                Some(VirtualTextureLayout::new(size, self.drape.repeats(), look.texture_bytes, device.image_layers)?);
+    /// The specialization constants of the scene's shaders.
+    pub fn constants(&self) -> SceneConstants {
+        let [map_columns, map_rows] = self.maps.map_or([0.0; 2], |layout| layout.extent.map(|pages| pages as f32));
+        SceneConstants {
+            coded: self.coded,
+            tiled: self.tiled,
+            page_shift: self.page_shift,
+            holes: self.holes,
+            fog: self.fog,
+            colour: self.colour,
+            filtered: self.filtered,
+            morph: self.requirements.morph != Morph::No,
+            skirts: self.requirements.seams == Seams::Skirts,
+            detail: self.detail,
+            distance: self.requirements.morph == Morph::ByDistance,
+            masked: self.stored.iter().all(|n| n.is_power_of_two()),
+            ceiling: self.ceiling,
+            map_shift: self.ground.map_or(0, |layout| 32 - layout.root_shift),
+            map_columns,
+            map_rows,
+            overlay_ends: self.drape.ends,
         }
-        Ok(self)
     }
 
-    /// Whether what is drawn is looked at on the host first: its triangles say which texels the ground needs.
+    /// Returns true if the host reads the draw list: its triangles tell which texels of the virtual ground are needed.
     pub fn reads_lists(&self) -> bool {
         self.ground.is_some()
     }
 
-    /// Whether pictures need a depth buffer.
+    /// Returns true if pictures need a depth buffer.
     pub fn has_depth(&self) -> bool {
         self.requirements.depth_mode == DepthMode::Buffer
     }
 
-    /// Texels of a page of the height texture (x, z).
+    /// Size of a page of the height texture, texels (x, z).
     pub fn page_size(&self) -> [u32; 2] {
         if self.page_shift == 0 { self.stored } else { [1 << self.page_shift; 2] }
     }
 
-    /// Pages of the height texture along (x, z).
+    /// Number of pages of the height texture along (x, z).
     pub fn pages(&self) -> [u32; 2] {
         let page = self.page_size();
         [0, 1].map(|k| self.stored[k].div_ceil(page[k]))
     }
 
-    /// Bytes of a stored height.
+    /// Size of a stored height, bytes.
     pub fn texel_bytes(&self) -> u64 {
         if self.coded { 2 } else { 4 }
     }
@@ -249,7 +225,7 @@ mod tests {
             let pages = stored.iter().map(|n| u64::from(n.div_ceil(1 << found))).product::<u64>();
             assert!(found == 0 || pages <= 2048, "{stored:?}: {pages} pages");
         }
-        // What no layers hold is refused by the largest pages.
+        // A field that no layers hold gets the largest pages; the check of layers rejects it.
         assert_eq!(page_shift([1 << 30, 1 << 30], &device), 14);
     }
 }

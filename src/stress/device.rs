@@ -48,8 +48,8 @@ impl DeviceImageChecker {
     }
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
-        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
-        Ok(plan.with_requirements(technique.pipeline_requirements()))
+        let plan = ScenePlan::builder(field, &self.look, &self.gpu.device_limits());
+        plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
     }
 
     fn renderer(&self, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Result<SceneRenderer> {
@@ -90,7 +90,8 @@ impl DeviceImageChecker {
         renderer.draw(technique, view, Copy::PictureAndDepth)?;
         renderer.complete()?;
         let picture = renderer.picture();
-        let plan = ScenePlan::new(field, &self.look, &self.gpu.device_limits()).map_err(anyhow::Error::msg)?;
+        let plan =
+            ScenePlan::builder(field, &self.look, &self.gpu.device_limits()).build().map_err(anyhow::Error::msg)?;
         let scene = self.scene(field, &plan);
         let holes = Truth::new(&scene, view)?.hole_pixels(&scene, view, &picture)?.len();
         if holes > 0 && seen.holes_at.is_none() {

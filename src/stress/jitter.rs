@@ -128,7 +128,7 @@ fn off(field: &Field, view: &View, way: Way, [i, j]: [u32; 2]) -> Option<DVec2> 
         Way::Product => {
             let frame = Frame::placing(field, view);
             let relative = relative_position(&frame, [i as i32, j as i32], field.height(i, j));
-            Mat4::from_cols_array_2d(&frame.clip_from_relative) * Vec3::from(relative).extend(1.0)
+            Mat4::from_cols_array_2d(&frame.camera.clip_from_relative) * Vec3::from(relative).extend(1.0)
         }
     };
     Some(pixel(drawn, view) - truth)

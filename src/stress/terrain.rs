@@ -5,10 +5,9 @@ use std::sync::Arc;
 use super::Finding;
 use super::forms::Form;
 use super::invariants::{INVARIANTS, SLACK, Subject, TOLERANCES_PX, Violation};
-use crate::draw::distance::is_by_distance;
 use crate::draw::expand;
 use crate::draw::layout::Frame;
-use crate::draw::weights::ONE;
+use crate::draw::weights::{FINER, ONE, Weights};
 use crate::draw::{DrawList, Instance};
 use crate::height::Field;
 use crate::lod::Technique;
@@ -68,9 +67,9 @@ fn in_numbers(subject: &mut Subject) -> Vec<Finding> {
 /// Whether every number that reaches a vertex is one: finite, not subnormal, weights of instances in [0, 1].
 pub fn all_numbers(field: &Field, technique: &dyn Technique, view: &View, list: &DrawList) -> Result<(), String> {
     if let Some(instance) = list.instances.iter().find(|instance| !has_weights(instance)) {
-        return Err(format!("weights {:x?} of the instance at {:?}", instance.weights, instance.origin));
+        return Err(format!("{:x?} of the instance at {:?}", instance.weights(), instance.origin));
     }
-    let frame = Frame { fraction_bits: list.fraction_bits as i32, ..Frame::placing(field, view) };
+    let frame = Frame::placing(field, view).with_fractions(list.fraction_bits);
     let mut wrong = None;
     expand::visit_triangles(field, &frame, technique.resident(), list, |triangle| {
         for corner in triangle.corners {
@@ -87,10 +86,18 @@ fn is_plain(number: f32) -> bool {
     number == 0.0 || number.is_normal()
 }
 
-/// Whether the bytes of an instance's weights are in [0, 1], on sides in [0, 2], flags left out.
+/// True if an instance's weights are in [0, 1], on sides in [0, 2], flags left out.
 fn has_weights(instance: &Instance) -> bool {
-    let bytes = |word: u32| word.to_le_bytes().map(u32::from);
-    let sides = instance.weights[1..3].iter().copied().flat_map(bytes).all(|byte| byte <= 2 * ONE);
-    let rest = [instance.weights[0], instance.weights[3]].into_iter().flat_map(bytes).all(|byte| byte & 127 <= ONE);
-    is_by_distance(instance) || sides && rest
+    let all = |word: u32, max: u32| word.to_le_bytes().into_iter().all(|byte| u32::from(byte) <= max);
+    let unflagged = |word: u32| word & !(0x0101_0101 * FINER);
+    match instance.weights() {
+        Weights::Slots(w) => {
+            all(w.first_sides, 2 * ONE)
+                && all(w.last_sides, 2 * ONE)
+                && all(unflagged(w.inside), ONE)
+                && all(unflagged(w.seams), ONE)
+        }
+        Weights::Skirts(w) => all(unflagged(w.inside), ONE) && w.depth_m >= 0.0 && w.depth_m.is_finite(),
+        Weights::Distance(_) => true,
+    }
 }

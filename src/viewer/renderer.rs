@@ -76,9 +76,8 @@ pub struct Shown {
 /// What the scene needs.
 fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Result<ScenePlan> {
     let (limits, picture) = (gpu.device_limits(), setup.overlay.as_ref().map(|picture| picture.dimensions().into()));
-    let plan = ScenePlan::new(&setup.field, look, &limits).map_err(anyhow::Error::msg)?;
-    let plan = plan.with_overlay(&setup.field, look, &limits, picture).map_err(anyhow::Error::msg)?;
-    Ok(ScenePlan { windowed: true, ..plan.with_requirements(technique.pipeline_requirements()) })
+    let plan = ScenePlan::builder(&setup.field, look, &limits).overlay(picture).windowed();
+    plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
 }
 
 impl WindowRenderer {

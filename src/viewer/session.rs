@@ -223,7 +223,7 @@ impl Session {
                     select_within_limits(stats.tolerance_scale)
                 ),
             ),
-            row("colours", format!("{}{wire}", colour_name(self.look.colour))),
+            row("colours", format!("{}{wire}", self.look.colour.name())),
             row(
                 "camera",
                 format!("{}, {}/s{wide}", self.camera.mode_name(), length_text(self.camera.speed(&self.site))),
@@ -276,20 +276,6 @@ fn next_colour(colour: Colour, picture: Picture) -> Colour {
         Colour::Error => Colour::Normal,
         Colour::Normal => Colour::Batch,
         Colour::Batch => Colour::Height,
-    }
-}
-
-fn colour_name(colour: Colour) -> &'static str {
-    match colour {
-        Colour::Height => "height",
-        Colour::Overlay => "overlay",
-        Colour::Maps => "maps",
-        Colour::Ground => "ground",
-        Colour::Nodes => "nodes",
-        Colour::Level => "level",
-        Colour::Error => "error",
-        Colour::Normal => "normal",
-        Colour::Batch => "batch",
     }
 }
 

@@ -1,4 +1,4 @@
-//! Fields and forms of techniques that the laws are tried on.
+//! Fields, and forms of techniques, on which the invariants are tested.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -8,19 +8,19 @@ use cuesta::height::{Field, Holes, Samples};
 use cuesta::lod::{Entry, Setting, Settings, TECHNIQUES, Values};
 use cuesta::stress::views;
 
-/// One choice of variant and settings.
+/// A choice of variant and settings.
 pub struct Form {
     pub name: String,
     pub entry: &'static Entry,
     pub settings: Settings,
 }
 
-/// Forms in which every value of an entry's settings meets every one of every other setting, and every variant.
+/// Returns forms in which every value of each setting meets every value of each other setting, and every variant.
 pub fn forms(entry: &'static Entry) -> Vec<Form> {
     pairwise(combinations(entry)).iter().map(|choice| form(entry, choice)).collect()
 }
 
-/// A variant, or none, as the value of no key, and a value for each setting.
+/// A value for each setting, preceded by the variant under an empty key.
 type Choice = Vec<(String, String)>;
 
 fn combinations(entry: &Entry) -> Vec<Choice> {
@@ -38,7 +38,7 @@ fn combinations(entry: &Entry) -> Vec<Choice> {
     choices
 }
 
-/// Of all choices few in which every two values occur together that do in any: each time the one with most new pairs.
+/// Returns a small subset of the choices that covers all pairs of values. Greedily adds the choice with most new pairs.
 fn pairwise(mut choices: Vec<Choice>) -> Vec<Choice> {
     let pairs = |choice: &Choice| -> Vec<_> {
         let upto = |k: usize| choice[..=k].iter().map(move |earlier| (earlier.clone(), choice[k].clone()));
@@ -56,8 +56,8 @@ fn pairwise(mut choices: Vec<Choice>) -> Vec<Choice> {
     }
 }
 
-/// The values that a setting is tried at: every word, and for a number one far below its default, since a length
-/// that suits real land shows nothing on these fields.
+/// Returns the values at which a setting is tested: every word, or a number far below the default, because a length for
+/// real terrain has no effect on these small fields.
 fn values(setting: &Setting) -> Vec<String> {
     match setting.values {
         Values::Words(words) => words.iter().map(|word| word.to_string()).collect(),
@@ -76,7 +76,7 @@ fn form(entry: &'static Entry, choice: &Choice) -> Form {
     Form { name, entry, settings: Settings::new(entry, variant, choices).expect("the table's own values") }
 }
 
-/// A deterministic number in 0..1 for a lattice position.
+/// Returns a deterministic number in 0..1 for a lattice position.
 fn noise(i: u32, j: u32) -> f32 {
     let mut k = i.wrapping_mul(0x9e37_79b1) ^ j.wrapping_mul(0x85eb_ca77);
     k = (k ^ (k >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -84,7 +84,7 @@ fn noise(i: u32, j: u32) -> f32 {
     ((k ^ (k >> 15)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Hills of a few sizes, 0 to about `height`.
+/// Returns hills of several sizes, from 0 to about `height`.
 fn hills(i: u32, j: u32, height: f32) -> f32 {
     let wave = |scale: f32, by: f32| ((i as f32 / scale + by).sin() + (j as f32 / scale - by).cos()) / 4.0 + 0.5;
     height * (0.6 * wave(17.0, 1.0) + 0.25 * wave(5.3, 2.0) + 0.1 * wave(2.1, 3.0) + 0.05 * noise(i, j))
@@ -106,7 +106,7 @@ fn holed(
     Field::new(Samples::F32(heights), [w, h], spacing, holes)
 }
 
-/// The fields, by name.
+/// Returns the test fields with their names.
 pub fn fields() -> Vec<(&'static str, Arc<Field>)> {
     let mut fields = vec![
         ("flat", field([65, 65], [10.0, 10.0], |_, _| 5.0)),
@@ -131,13 +131,13 @@ pub fn fields() -> Vec<(&'static str, Arc<Field>)> {
     fields.into_iter().map(|(name, field)| (name, Arc::new(field))).collect()
 }
 
-/// A lake, whole blocks without data at one side, and scattered single samples.
+/// Returns true for a lake, for whole blocks at one side, and for scattered single samples.
 fn islands(i: u32, j: u32) -> bool {
     let lake = (f64::from(i) - 40.0).hypot(f64::from(j) - 30.0) < 21.0;
     lake || i > 105 + j / 9 || noise(i, j) > 0.99
 }
 
-/// Real land, little-endian codes for 693 to 3416 m: Taiwan, Ministry of the Interior.
+/// Real terrain, little-endian codes for 693 to 3416 m: Taiwan, Ministry of the Interior.
 fn stretched_r16() -> Option<(&'static str, Field)> {
     let bytes = real("taiwan_xueshan_513x513_le_stretched.r16")?;
     let code = |i: u32, j: u32| {
@@ -148,7 +148,7 @@ fn stretched_r16() -> Option<(&'static str, Field)> {
     Some(("real mountains", field([193, 161], [20.0, 20.0], height)))
 }
 
-/// Real land with voids: SRTM, Andorra.
+/// Real terrain with voids: SRTM, Andorra.
 fn srtm_with_voids() -> Option<(&'static str, Field)> {
     let bytes = real("N42E001.hgt")?;
     let metres = |k: usize| i16::from_be_bytes([bytes[2 * k], bytes[2 * k + 1]]);
@@ -163,21 +163,21 @@ fn real(file: &str) -> Option<Vec<u8>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(file);
     let bytes = std::fs::read(path).ok();
     if bytes.is_none() {
-        println!("skipped: no real land, ../shared/data/{file} is absent");
+        println!("skipped: no real terrain, ../shared/data/{file} is absent");
     }
     bytes
 }
 
 #[test]
-fn every_field_is_once_seen_whole_and_once_in_part() {
+fn fields_have_whole_and_partial_views() {
     for (name, field) in fields() {
         let whole = views::views(&field).iter().filter(|(_, view)| views::sees_everything(&field, view)).count();
-        assert!((1..8).contains(&whole), "{name}: seen whole in {whole} views");
+        assert!((1..8).contains(&whole), "{name}: wholly visible in {whole} views");
     }
 }
 
 #[test]
-fn every_two_values_of_settings_meet() {
+fn forms_cover_all_pairs_of_settings() {
     for entry in TECHNIQUES {
         let forms = forms(entry);
         let whole = combinations(entry).len();

@@ -1,6 +1,6 @@
-//! The laws that every technique keeps in every form, on every field, from every view. No device is needed.
+//! The invariants that every technique keeps in every form, on every field, from every view. Needs no device.
 //!
-//! [`violation`] holds each law against techniques that break it.
+//! [`mutants`] checks that each invariant fails on techniques that violate it.
 
 pub(crate) mod cases;
 mod mutants;
@@ -13,8 +13,8 @@ use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
 use cuesta::stress::views;
 use rayon::prelude::*;
 
-/// All laws at once, so that each technique is prepared once: a failure names the law, the technique with its
-/// settings, the field and the view.
+/// Checks all invariants at once, so that each technique is prepared once. A failure names the invariant, the technique
+/// with its settings, the field and the view.
 #[test]
 fn every_technique_keeps_every_invariant() {
     let fields = cases::fields();

@@ -1,13 +1,14 @@
-//! Techniques broken on purpose, one mechanism each: every law must fail on what breaks it.
+//! Mutants: techniques with one broken mechanism each. Every invariant must fail on its mutant.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
+use cuesta::draw::weights::{SkirtWeights, SlotWeights};
 use cuesta::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Seams, Source,
-    Topology, skirts,
+    Topology,
 };
 use cuesta::height::Field;
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
@@ -19,7 +20,7 @@ use cuesta::stress::views;
 
 use super::cases;
 
-/// A law, how it is broken, words of the complaint, the field's name and the technique.
+/// Invariant, mutation, words of the expected message, name of the field, and constructor of the mutant.
 type Mutant = (&'static str, &'static str, &'static str, &'static str, fn(&Arc<Field>) -> Box<dyn Technique>);
 
 const MUTANTS: &[Mutant] = &[
@@ -31,13 +32,13 @@ const MUTANTS: &[Mutant] = &[
     ("one surface", "a triangle flipped", "Fold", "131 × 67", |field| streamed(field, flip_a_triangle)),
     ("one surface", "a triangle dropped", "Gap", "real mountains", |field| streamed(field, drop_a_triangle)),
     ("one surface", "a vertex one ulp off", "Crack", "tiled", |field| streamed(field, nudge_a_vertex)),
-    ("one surface", "a side a step ahead of its other tile", "Crack", "131 × 67", |field| {
+    ("one surface", "a side one morph step ahead", "Crack", "131 × 67", |field| {
         Box::new(Changed { seams: Seams::Shared, inner: smooth_tiles(field), change: nudge_a_side })
     }),
     ("one surface", "too narrow a frustum", "Gap", "131 × 67", |field| in_another_view(field, narrower)),
     ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| each_depth(list, 0.5))),
     ("one surface", "a side without its skirt", "Seam", "131 × 67", |field| skirted(field, drop_a_skirt)),
-    ("one surface", "skirts where none are said to be", "Crack", "131 × 67", |field| {
+    ("one surface", "skirts although sides are shared", "Crack", "131 × 67", |field| {
         Box::new(Changed { seams: Seams::Shared, inner: clusters(field), change: |_| () })
     }),
     ("everything in sight is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
@@ -52,17 +53,17 @@ const MUTANTS: &[Mutant] = &[
     ("error within tolerance", "the paper's metric", "px of", "131 × 67", |field| {
         in_another_view(field, with_paper_metric)
     }),
-    ("same view, same list", "a clock", "differ", "131 × 67", |field| {
+    ("same view, same list", "a counter", "differ", "131 × 67", |field| {
         in_another_view(field, every_other_time_coarser)
     }),
-    ("teleport and return, same list", "a grudge", "after a journey", "131 × 67", |field| {
+    ("teleport and return, same list", "a persistent coarser level", "after a journey", "131 × 67", |field| {
         in_another_view(field, coarser_since_far_away)
     }),
     ("lists fit the limits", "an instance too many", "exceeds", "ramp", |field| changed(field, one_instance_too_many)),
     ("lists fit the limits", "an index too many", "reaches outside", "ramp", |field| {
         changed(field, one_index_too_many)
     }),
-    ("a wider tolerance never draws more", "the inverse", "triangles by tolerance", "131 × 67", |field| {
+    ("a wider tolerance never draws more", "the inverse tolerance", "triangles by tolerance", "131 × 67", |field| {
         in_another_view(field, |view, _| views::with_tolerance(view, 1.0 / view.tolerance.px))
     }),
     ("holes stay holes", "holes drawn", "nothing but holes", "holes", |field| Blocks::boxed(field, true, &[0])),
@@ -72,7 +73,7 @@ const MUTANTS: &[Mutant] = &[
 ];
 
 #[test]
-fn every_invariant_fails_on_what_breaks_it() {
+fn mutants_are_detected() {
     let fields = cases::fields();
     for (invariant, mutant, complaint, field, build) in MUTANTS {
         let Some((_, field)) = fields.iter().find(|(name, _)| name == field) else { continue };
@@ -82,7 +83,7 @@ fn every_invariant_fails_on_what_breaks_it() {
             Subject { field, technique: &mut *technique, views: &views, tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
         let invariant = INVARIANTS.iter().find(|l| l.name == *invariant).expect("an invariant of the table");
         match (invariant.check)(&mut subject) {
-            Ok(()) => panic!("{}: not broken by {mutant}", invariant.name),
+            Ok(()) => panic!("{}: does not detect {mutant}", invariant.name),
             Err(violation) => assert!(violation.why.contains(complaint), "{}: {mutant}: {violation}", invariant.name),
         }
     }
@@ -91,9 +92,9 @@ fn every_invariant_fails_on_what_breaks_it() {
     assert_eq!(violation, invariants, "every invariant is violated once");
 }
 
-/// What the breakers are made of keeps the laws when it is not broken.
+/// Checks that the mutants' base techniques keep the invariants when not mutated.
 #[test]
-fn unbroken_it_keeps_the_invariants() {
+fn unmutated_bases_keep_the_invariants() {
     let fields = cases::fields();
     let (_, field) = fields.iter().find(|(name, _)| *name == "131 × 67").expect("a field of the list");
     let whole: [Box<dyn Technique>; 5] = [
@@ -111,7 +112,7 @@ fn unbroken_it_keeps_the_invariants() {
             tolerances_px: &TOLERANCES_PX,
             time_s: 0.0,
         };
-        // Clusters have blocks of several levels.
+        // Clusters may have blocks of several levels.
         let has_levels = subject.technique.pipeline_requirements().seams == Seams::Shared;
         for invariant in
             INVARIANTS.iter().filter(|invariant| has_levels || invariant.name != "neighbours within one level")
@@ -127,7 +128,7 @@ fn geomipmap(field: &Arc<Field>) -> Box<dyn Technique> {
     (entry.build)(Arc::clone(field), &settings)
 }
 
-/// Geomipmap with its lists changed.
+/// A technique with its lists changed.
 struct Changed {
     seams: Seams,
     inner: Box<dyn Technique>,
@@ -151,10 +152,13 @@ fn smooth_tiles(field: &Arc<Field>) -> Box<dyn Technique> {
     (entry.build)(Arc::clone(field), &settings)
 }
 
-/// One step of a morph on the last sides of the tile in the middle of the list.
+/// Adds one step of a morph to the last sides of the tile in the middle of the list.
 fn nudge_a_side(list: &mut DrawList) {
     let middle = list.instances.len() / 2;
-    list.instances.iter_mut().skip(middle).take(1).for_each(|tile| tile.weights[2] += 0x0101_0101);
+    list.instances.iter_mut().skip(middle).take(1).for_each(|tile| {
+        let weights = SlotWeights::of(tile);
+        *tile = tile.with_weights(SlotWeights { last_sides: weights.last_sides + 0x0101_0101, ..weights });
+    });
 }
 
 fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
@@ -163,15 +167,18 @@ fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> 
 
 fn each_depth(list: &mut DrawList, factor: f32) {
     for instance in &mut list.instances {
-        let [_, sides, depth, _] = instance.weights;
-        skirts::set(&mut instance.weights, sides, factor * f32::from_bits(depth));
+        let weights = SkirtWeights::of(instance);
+        *instance = instance.with_weights(SkirtWeights { depth_m: factor * weights.depth_m, ..weights });
     }
 }
 
-/// The first skirt of each list: its bit.
+/// Removes the bit of the first skirt in a list.
 fn drop_a_skirt(list: &mut DrawList) {
-    let skirted = list.instances.iter_mut().find(|instance| instance.weights[1] != 0);
-    skirted.into_iter().for_each(|instance| instance.weights[1] &= instance.weights[1] - 1);
+    let skirted = list.instances.iter_mut().find(|instance| SkirtWeights::of(instance).sides != 0);
+    skirted.into_iter().for_each(|instance| {
+        let weights = SkirtWeights::of(instance);
+        *instance = instance.with_weights(SkirtWeights { sides: weights.sides & (weights.sides - 1), ..weights });
+    });
 }
 
 impl Technique for Changed {
@@ -197,7 +204,7 @@ impl Technique for Changed {
     }
 }
 
-/// The draws of one level's borders and centre hold the same blocks: all of them lose one.
+/// Removes the last block from all draws; the draws of one level's borders and centre share blocks.
 fn drop_a_block(list: &mut DrawList) {
     let Some(victim) = list.instances.len().checked_sub(1) else { return };
     list.draws.iter_mut().for_each(|draw| draw.instances.end = draw.instances.end.min(victim as u32));
@@ -221,7 +228,7 @@ fn one_index_too_many(list: &mut DrawList) {
     list.draws.iter_mut().for_each(|draw| draw.indices = draw.indices.start + 900_000..draw.indices.end + 900_000);
 }
 
-/// Geomipmap's triangles as a stream of their own, changed.
+/// Geomipmap's triangles as an explicit stream, changed.
 struct Streamed {
     field: Arc<Field>,
     inner: Box<dyn Technique>,
@@ -294,7 +301,7 @@ fn nudge_a_vertex(geometry: &mut Geometry) {
     geometry.vertices.iter_mut().skip(middle).take(1).for_each(|vertex| vertex.height = vertex.height.next_up());
 }
 
-/// Geomipmap that is told another view than there is; the number counts its lists.
+/// Geomipmap that receives another view than the list is for. `count` is passed to the function that changes the view.
 struct InAnotherView {
     inner: Box<dyn Technique>,
     view: fn(&View, &mut u32) -> View,
@@ -338,13 +345,13 @@ fn every_other_time_coarser(view: &View, count: &mut u32) -> View {
     views::with_tolerance(view, if count.is_multiple_of(2) { 30.0 } else { 1.0 })
 }
 
-/// Once it has been far away it is coarser for good.
+/// Uses a coarser tolerance permanently after a view from far away.
 fn coarser_since_far_away(view: &View, count: &mut u32) -> View {
     *count += u32::from(view.eye.y > 1e4);
     views::with_tolerance(view, if *count > 0 { 30.0 } else { 1.0 })
 }
 
-/// Blocks of 8 cells all over the field, holes too, their levels along a diagonal from a list.
+/// Blocks of 8 cells over the whole field, including holes, with levels along a diagonal from a list.
 struct Blocks {
     mesh: BlockMesh,
     count: [i32; 2],

@@ -1,7 +1,7 @@
-//! Random cases of every technique, held against every invariant.
+//! Random cases of every technique, checked against every invariant.
 //!
-//! `SWEEP_CASES` sets their number, `SWEEP_SEED` their seed; `SWEEP_TECHNIQUE` picks one technique; `SWEEP_CASE` runs
-//! the one case that a failure printed.
+//! `SWEEP_CASES` sets their number and `SWEEP_SEED` their seed. `SWEEP_TECHNIQUE` selects one technique. `SWEEP_CASE`
+//! runs the single case that a failure printed.
 
 use std::env;
 use std::path::Path;
@@ -19,13 +19,13 @@ use cuesta::stress::views;
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
 
-/// Cases of a run where nothing else is set: about two minutes on two cores.
+/// Default number of cases: about two minutes on two cores.
 const CASES: u64 = 9000;
 const SEED: u64 = 19;
 
 fn set<T: FromStr>(key: &str) -> Option<T> {
     let value = env::var(key).ok()?;
-    Some(value.parse().unwrap_or_else(|_| panic!("{key}={value}: it cannot be read")))
+    Some(value.parse().unwrap_or_else(|_| panic!("{key}={value}: invalid value")))
 }
 
 #[test]
@@ -48,25 +48,26 @@ fn random_cases_keep_every_invariant() {
     assert!(few.is_empty(), "{} of {cases} cases fail, the first:\n{}", failures.len(), few.join("\n"));
 }
 
-/// Views of fields that are too large for all.
+/// Views of fields that are too large for all views.
 const FEW_VIEWS: [&str; 3] = ["from above a corner", "straight down", "orthographic"];
-/// The invariants of what is drawn where.
+/// Invariants about coverage.
 const OF_COVERAGE: [&str; 3] = ["one surface", "everything in sight is drawn", "a wider tolerance never draws more"];
 
-/// Fields whose sides are not 2^n + 1, and tolerances at which coarse triangles stick out of them, once drawn with holes.
+/// Fields whose sides are not 2^n + 1, at tolerances where coarse triangles extend beyond them, which were once drawn
+/// with holes.
 #[test]
 fn coarse_triangles_reach_the_edge_of_any_field() {
-    let made = |kind: &str, size, seed| {
+    let synthetic = |kind: &str, size, seed| {
         let field = synth::synth(kind.parse().expect("a kind"), size, seed);
         (format!("{kind} {} x {}", size[0], size[1]), Some(Arc::new(field)))
     };
     let fields = [
-        (made("ridge", [921, 859], 3), &[4.0, 8.0][..]),
-        (made("cliff", [921, 859], 3), &[4.0, 8.0]),
-        (made("eroded", [921, 859], 3), &[16.0, 64.0]),
-        (made("eroded", [1198, 9], 3), &[1.7, 30.0]),
-        (made("spike", [55, 311], 3), &[2.4]),
-        (made("flat", [226, 70], 3), &[0.7]),
+        (synthetic("ridge", [921, 859], 3), &[4.0, 8.0][..]),
+        (synthetic("cliff", [921, 859], 3), &[4.0, 8.0]),
+        (synthetic("eroded", [921, 859], 3), &[16.0, 64.0]),
+        (synthetic("eroded", [1198, 9], 3), &[1.7, 30.0]),
+        (synthetic("spike", [55, 311], 3), &[2.4]),
+        (synthetic("flat", [226, 70], 3), &[0.7]),
         (real("gabilan_lidar1m_921x859_f32_cog_deflate_pred3.tif"), &[1.0, 2.0, 3.0, 4.0]),
     ];
     let forms: [&[(&str, &str)]; 3] = [&[], &[("morph", "on"), ("hold", "on")], &[("patches", "resident")]];
@@ -94,7 +95,7 @@ fn coarse_triangles_reach_the_edge_of_any_field() {
     });
 }
 
-/// The view that `render` takes by default.
+/// Returns the default view of `render`.
 fn default_view(field: &Field) -> View {
     let size = [640, 360];
     let Whole { eye, world_from_eye, radius, .. } = Whole::of(field, 60.0, size);
@@ -112,31 +113,31 @@ fn real(file: &str) -> (String, Option<Arc<Field>>) {
     (file.to_string(), Some(Arc::new(height::load(&path, &Options::default()).expect("a field").field)))
 }
 
-/// Cases that failed once, as the sweep printed them.
+/// Cases that once failed, as printed by the sweep.
 const FOUND: [&str; 6] = [
-    // A block of nothing but holes was drawn with the square at the edge that it lies in.
+    // A block of only holes was drawn with the square at the edge that contains it.
     r#"{"technique":"sphere-tree","terrain":{"kind":"ramp","size":[34,6],"seed":0,"spacing":[10.0,10.0],"voids":"Most"},"view":{"at":[0.5,0.5],"above":1.0,"direction":{"Turned":[0.0,-90.0]},"lens":{"Degrees":90.0},"size":[64,64],"near":0.0001},"tolerance_px":0.25}"#,
     r#"{"technique":"sphere-tree","terrain":{"kind":"peers","size":[56,7],"seed":0,"spacing":[10.0,10.0],"voids":"Most"},"view":{"at":[1.0,-3.25],"above":0.125,"direction":{"Towards":[0.787,0.059]},"lens":{"Parallel":1.82},"size":[1000,30],"near":0.0001},"tolerance_px":1.8}"#,
-    // A block at the end of a tiled field took the land of the whole tile for its own.
+    // A block at the end of a tiled field used the data of the whole tile.
     r#"{"technique":"clusters","terrain":{"kind":"ramp","size":[6,17],"seed":0,"spacing":[10.0,10.0],"voids":"Most","tiles":[2,4]},"view":{"at":[0.0,0.0],"above":9.3e-10,"direction":{"Towards":[0.746,0.552]},"lens":{"Degrees":90.0},"size":[64,64],"near":0.0001},"tolerance_px":16.0}"#,
-    // The check itself missed land beyond the reach of the list.
+    // The check itself ignored that the list has a limited draw distance.
     r#"{"technique":"sorted-strips","settings":[["far","0.0798"]],"terrain":{"kind":"flat","size":[2,66],"seed":0,"spacing":[10.0,10.0]},"view":{"at":[1.25,0.25],"above":0.002,"direction":{"Towards":[0.428,0.67]},"lens":{"Degrees":90.0},"size":[64,64],"near":0.0001},"tolerance_px":1.0}"#,
-    // The chunk buffer of a field of few tiles did not hold tiles of many levels, and the tolerance was widened.
+    // The chunk buffer of a field of few tiles did not hold tiles of many levels, and the tolerance was scaled.
     r#"{"technique":"smooth-tiles","settings":[["tile","65"]],"terrain":{"kind":"spike","size":[2,465],"seed":216,"spacing":[10.0,10.0]},"view":{"at":[0.5,0.5],"above":1.0,"direction":{"Turned":[0.0,-90.0]},"lens":{"Degrees":90.0},"size":[64,64],"near":0.0001},"tolerance_px":32.0}"#,
     r#"{"technique":"smooth-tiles","settings":[["tile","65"],["memory","6.46"]],"terrain":{"kind":"cliff","size":[2,66],"seed":0,"spacing":[10.0,10.0]},"view":{"at":[0.5,0.5],"above":1.0,"direction":{"Turned":[0.0,-90.0]},"lens":{"Degrees":90.0},"size":[64,64],"near":0.0001},"tolerance_px":1.0}"#,
 ];
 
 #[test]
-fn what_the_sweep_once_found_holds() {
+fn past_failures_stay_fixed() {
     for line in FOUND {
         let case: SweepCase = line.parse().expect("a case");
         case.check().unwrap_or_else(|failure| panic!("{failure}"));
     }
 }
 
-/// The list that a flat field needs stays short, whatever its size.
+/// The list of a flat field stays short for any size.
 #[test]
-fn a_flat_field_of_any_size_takes_few_triangles() {
+fn flat_fields_take_few_triangles() {
     for (size, max) in [([226, 70], 15), ([921, 859], 139), ([129, 129], 2), ([20, 31], 2), ([1300, 2], 22)] {
         let field = Arc::new(synth::synth(synth::Kind::Flat, size, 3));
         let entry = lod::find("sphere-tree").expect("a row of the table");
@@ -148,7 +149,7 @@ fn a_flat_field_of_any_size_takes_few_triangles() {
     }
 }
 
-/// GeoMipMapping without its last block.
+/// Geomipmap without its last block.
 struct BlockLost(Box<dyn Technique>);
 
 impl Technique for BlockLost {
@@ -179,7 +180,7 @@ static BLOCK_LOST: Entry = Entry {
 };
 
 #[test]
-fn what_is_broken_is_found_and_made_small() {
+fn broken_techniques_are_detected_and_shrunk() {
     let case = |number| random::case(SEED, number, &BLOCK_LOST, None);
     let failures: Vec<_> = (0..20).filter_map(|number| case(number).check_with(&BLOCK_LOST).err()).collect();
     assert!(failures.len() > 5, "{} of 20 cases fail", failures.len());
@@ -187,5 +188,5 @@ fn what_is_broken_is_found_and_made_small() {
     let SweepCase { terrain, settings, .. } = &shrunk.case;
     assert_eq!((terrain.kind.as_str(), terrain.size), ("flat", [2, 2]), "{shrunk}");
     assert!(settings.is_empty() && shrunk.invariant == "one surface", "{shrunk}");
-    assert_eq!(shrunk.case.to_string().parse(), Ok(shrunk.case.clone()), "it is read as it was printed");
+    assert_eq!(shrunk.case.to_string().parse(), Ok(shrunk.case.clone()), "a printed case reads back the same");
 }

@@ -19,9 +19,10 @@ use super::{as_f32, aslant, difference, mountains, on_device, technique};
 
 fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     let mut renderer =
         Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, view.size).unwrap();
     renderer.draw(technique, view, Copy::PictureAndDepth).unwrap();
@@ -43,7 +44,7 @@ fn assert_same(
     name: &str,
 ) {
     let captured = renderer.capture(technique, view).unwrap();
-    let frame = Frame { fraction_bits: renderer.list.fraction_bits as i32, ..Frame::placing(field, view) };
+    let frame = Frame::placing(field, view).with_fractions(renderer.list.fraction_bits);
     let expanded = [expand::triangles, expand::skirts].map(|e| e(field, &frame, technique.resident(), &renderer.list));
     assert_eq!(captured.each_ref().map(Vec::len), expanded.each_ref().map(Vec::len), "{name}");
     assert_eq!(expanded[1].is_empty(), technique.pipeline_requirements().seams == Seams::Shared, "{name}");

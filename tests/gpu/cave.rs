@@ -31,7 +31,10 @@ fn flight(field: &Field, frames: usize, px: f64) -> Vec<View> {
 }
 
 fn plan(gpu: &Gpu, field: &Field, look: &Look, technique: &dyn Technique) -> ScenePlan {
-    ScenePlan::new(field, look, &gpu.device_limits()).unwrap().with_requirements(technique.pipeline_requirements())
+    ScenePlan::builder(field, look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap()
 }
 
 fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, look: &Look, technique: &dyn Technique, view: &View) -> SceneRenderer {
@@ -149,6 +152,6 @@ fn a_ceiling_is_there_only_where_it_is_needed() {
         assert!(bytes(&cave) >= 4 * 257 * 193);
         let alone = Arc::new(synth(Kind::CaveFloor, [257, 193], 7));
         assert_eq!(bytes(&alone), 0);
-        assert!(!ScenePlan::new(&alone, &Look::default(), &gpu.device_limits()).unwrap().ceiling);
+        assert!(!ScenePlan::builder(&alone, &Look::default(), &gpu.device_limits()).build().unwrap().ceiling);
     });
 }

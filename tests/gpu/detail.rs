@@ -15,9 +15,10 @@ use super::{difference, on_device, technique};
 fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, detail: bool, view: &View) -> RgbaImage {
     let look = Look { detail, ..Look::default() };
     let mut technique = technique(field, "clusters", &["block=16"]);
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     scene.render(technique.as_mut(), view, 1).unwrap().picture
 }
@@ -86,9 +87,10 @@ fn memory_does_not_grow_with_the_tiling() {
             let view = view(field.world_at(300.0, 300.0, 2000.0), -30.0);
             let look = Look { detail: true, ..Look::default() };
             let mut technique = technique(&field, "clusters", &["block=16"]);
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits())
-                .unwrap()
-                .with_requirements(technique.pipeline_requirements());
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits())
+                .requirements(technique.pipeline_requirements())
+                .build()
+                .unwrap();
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             scene.render(technique.as_mut(), &view, 1).unwrap().device_bytes
         });

@@ -1,4 +1,4 @@
-//! The whole neck is executed: resident, streamed and uploaded explicit geometry, lists and strips.
+//! Every kind of draw is executed: resident, streamed and uploaded explicit geometry, triangle lists and strips.
 
 use std::sync::Arc;
 

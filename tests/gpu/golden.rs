@@ -29,9 +29,10 @@ fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file
     view.eye = field.world_at(20.0, 270.0, f64::from(statistics.max) + 200.0);
     view.world_from_eye = View::looking_along(field.world_at(180.0, 140.0, statistics.mean) - view.eye);
     let mut technique = technique(&field, name, settings);
-    let plan = ScenePlan::new(&field, look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(&field, look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look, overlay: None };
     let drawn = scene.render(technique.as_mut(), &view, 1).unwrap().picture;
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{file}.png"));

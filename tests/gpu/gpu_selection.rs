@@ -33,8 +33,10 @@ fn set(list: &DrawList) -> Set {
 
 fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, SIZE).unwrap()
 }
 

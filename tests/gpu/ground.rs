@@ -29,9 +29,9 @@ fn renderer(
     view: &View,
 ) -> SceneRenderer {
     let (limits, technique) = (gpu.device_limits(), technique(field, name, &[]));
-    let plan = ScenePlan::new(field, look, &limits).unwrap().with_requirements(technique.pipeline_requirements());
     let size = picture.map(|picture| picture.dimensions().into());
-    let plan = plan.with_overlay(field, look, &limits, size).unwrap();
+    let plan = ScenePlan::builder(field, look, &limits).overlay(size);
+    let plan = plan.requirements(technique.pipeline_requirements()).build().unwrap();
     Scene { gpu, field, plan: &plan, look, overlay: picture }.renderer(technique.as_ref(), view.size).unwrap()
 }
 

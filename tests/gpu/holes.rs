@@ -26,7 +26,7 @@ fn an_outline_just_outside_of_the_picture_may_come_in() {
             lens: Lens::Orthographic { width: f64::from(size[0]) * metres, far: 20_000.0 },
             ..aslant(&field, size, 1.0)
         };
-        let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+        let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
         let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
         let truth = Truth::new(&scene, &view).unwrap();
         assert!(truth.picture.pixels().all(|p| p.0[3] == 255), "land fills the picture");

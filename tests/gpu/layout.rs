@@ -1,9 +1,10 @@
-//! The structs of draw/layout.rs lie in the compiled SPIR-V where the host has them.
+//! Shared structs have the same layout on the host and in the compiled SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use cuesta::draw::layout;
 use cuesta::gpu::shaders;
+use cuesta::lod::clusters;
 
 /// Offsets of the members of every named struct of a module: struct name → member name → offset.
 fn offsets(words: &[u32]) -> BTreeMap<String, BTreeMap<String, u32>> {
@@ -39,7 +40,7 @@ fn shared_structs_have_the_same_offsets_on_both_sides() {
     let mut seen = BTreeSet::new();
     for (shader, _) in shaders::SHADERS {
         let compiled = offsets(&shaders::words(shader));
-        for (name, _, fields) in layout::structs() {
+        for (name, _, fields) in layout::structs().into_iter().chain(clusters::layout::structs()) {
             let Some(members) = compiled.get(name) else { continue };
             for (field, offset) in fields {
                 let there = members.get(field).unwrap_or_else(|| panic!("{shader}: {name} lacks {field}"));
@@ -49,5 +50,10 @@ fn shared_structs_have_the_same_offsets_on_both_sides() {
         }
     }
     // The others reach shaders as vertex attributes only, whose offsets are the host's own.
-    assert!(["Frame", "Instance", "ExplicitVertex"].iter().all(|name| seen.contains(name)), "{seen:?}");
+    assert!(
+        ["Frame", "Camera", "HeightMap", "Lighting", "Instance", "ExplicitVertex", "ClusterView", "ClusterTree"]
+            .iter()
+            .all(|name| seen.contains(name)),
+        "{seen:?}"
+    );
 }

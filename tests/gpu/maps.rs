@@ -36,9 +36,8 @@ fn look(texture_bytes: u64) -> Look {
 
 fn plan(gpu: &Gpu, field: &Arc<Field>, look: &Look, picture: &RgbaImage) -> ScenePlan {
     let limits = gpu.device_limits();
-    let plan = ScenePlan::new(field, look, &limits).unwrap();
-    let plan = plan.with_overlay(field, look, &limits, Some(picture.dimensions().into())).unwrap();
-    plan.with_requirements(technique(field, "sorted-strips", &[]).pipeline_requirements())
+    let plan = ScenePlan::builder(field, look, &limits).overlay(Some(picture.dimensions().into()));
+    plan.requirements(technique(field, "sorted-strips", &[]).pipeline_requirements()).build().unwrap()
 }
 
 /// A scene made ready for strips with so many bytes for the picture.

@@ -44,9 +44,10 @@ fn with_scene(
     work: impl FnOnce(&Scene, &mut dyn Technique) -> Result<()>,
 ) -> Result<()> {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     work(&Scene { gpu, field, plan: &plan, look: &look, overlay: None }, technique)
 }
 

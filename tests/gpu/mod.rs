@@ -79,9 +79,10 @@ fn render_planned(
 
 /// The picture of a field with the default look.
 fn render(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, view: &View) -> RenderResult {
-    let plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &Look::default(), &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     render_planned(gpu, field, &plan, technique, view)
 }
 

@@ -53,9 +53,8 @@ fn above(field: &Field, at: [f64; 2], px: f64) -> View {
 fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, picture: &RgbaImage, look: &Look, view: &View) -> RgbaImage {
     let mut technique = technique(field, "clusters", &[]);
     let limits = gpu.device_limits();
-    let plan = ScenePlan::new(field, look, &limits).unwrap();
-    let plan = plan.with_overlay(field, look, &limits, Some(picture.dimensions().into())).unwrap();
-    let plan = plan.with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, look, &limits).overlay(Some(picture.dimensions().into()));
+    let plan = plan.requirements(technique.pipeline_requirements()).build().unwrap();
     assert_eq!(plan.maps.is_some(), look.texture_bytes < 1 << 20, "whole, or in maps");
     let scene = Scene { gpu, field, plan: &plan, look, overlay: Some(picture) };
     let mut renderer = scene.renderer(technique.as_ref(), view.size).unwrap();

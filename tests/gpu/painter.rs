@@ -18,9 +18,10 @@ const SIZE: [u32; 2] = [96, 64];
 
 pub(super) fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> SceneRenderer {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits())
-        .unwrap()
-        .with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     Scene { gpu, field, plan: &plan, look: &look, overlay: None }.renderer(technique, size).unwrap()
 }
 

@@ -1,4 +1,4 @@
-//! What a scene does not need is left out, and forcing it in changes nothing that can be seen.
+//! Features that a scene does not need are omitted, and forcing one changes no picture.
 
 use std::sync::Arc;
 
@@ -21,16 +21,16 @@ fn forced_features_show_the_same_picture() {
         let render = |field: &Arc<Field>, plan: &ScenePlan| {
             render_planned(gpu, field, plan, technique(field, "geomipmap", &["block=17"]).as_mut(), &view).picture
         };
-        let plan = ScenePlan::new(&field, &Look::default(), &gpu.device_limits()).unwrap();
+        let plan = ScenePlan::builder(&field, &Look::default(), &gpu.device_limits()).build().unwrap();
         assert!(plan.coded && !plan.holes && !plan.tiled && !plan.fog && plan.page_shift == 0 && plan.filtered);
         let lean = render(&field, &plan);
         let same = |name: &str, forced: ScenePlan| assert_eq!(render(&field, &forced), lean, "{name}");
         same("holes", ScenePlan { holes: true, ..plan.clone() });
         same("tiling", ScenePlan { tiled: true, ..plan.clone() });
-        // Nobody says how far.
+        // All weights are 0.
         same(
             "morphing",
-            plan.clone().with_requirements(PipelineRequirements {
+            plan.with_requirements(PipelineRequirements {
                 morph: Morph::ByInstance,
                 ..PipelineRequirements::default()
             }),
@@ -39,7 +39,7 @@ fn forced_features_show_the_same_picture() {
         same("fog", ScenePlan { fog: true, ..plan.clone() });
         same("queries", ScenePlan { measured: false, ..plan.clone() });
         let normals = Look { colour: Colour::Normal, ..Look::default() };
-        let of_normals = ScenePlan::new(&field, &normals, &gpu.device_limits()).unwrap();
+        let of_normals = ScenePlan::builder(&field, &normals, &gpu.device_limits()).build().unwrap();
         let detailed = ScenePlan { detail: true, ..of_normals.clone() };
         assert_eq!(render(&field, &detailed), render(&field, &of_normals), "detail");
         let wide = as_f32(&field);
@@ -52,10 +52,10 @@ fn forced_features_show_the_same_picture() {
     });
 }
 
-/// Every technique, every feature that its scene leaves out: kept by hand it takes what the plan says, and the picture
-/// is the same wherever the scene cannot tell.
+/// For every technique and every feature that its scene omits: kept by hand, the feature takes the memory in the plan,
+/// and the picture does not change.
 #[test]
-fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
+fn every_omitted_feature_saves_something_and_changes_no_picture() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [160, 120], 1.0);
@@ -70,8 +70,10 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
             ("clusters", &["block=8"]),
         ] {
             let mut techniques = [technique(&field, name, settings), technique(&field, name, settings)];
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
-            let plan = plan.with_requirements(techniques[0].pipeline_requirements());
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits())
+                .requirements(techniques[0].pipeline_requirements())
+                .build()
+                .unwrap();
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let (lean, savings) = savings::measure(&scene, &mut techniques, &view, 1).unwrap();
             assert!(lean.bytes > 0 && lean.pipelines > 1 && lean.instructions > 100, "{name}: {lean:?}");
@@ -100,7 +102,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
                 kept_in_some.insert(saving.feature);
             }
         }
-        // Nothing is measured in a scene that leaves queries out; all others are left out in some scene above.
+        // Scenes with queries are needed to measure; every other feature is omitted in some scene above.
         let forcible = FEATURES.iter().filter(|f| f.can_be(true) && f.name != "queries").map(|f| f.name);
         assert!(forcible.clone().all(|name| kept_in_some.contains(name)), "{kept_in_some:?}");
         assert_eq!(kept_in_some.len(), forcible.count());
@@ -108,7 +110,7 @@ fn every_feature_that_is_left_out_saves_something_and_shows_nothing() {
 }
 
 #[test]
-fn what_is_left_out_by_hand_is_not_there() {
+fn features_omitted_by_hand_are_off() {
     on_device(|gpu| {
         let field = without_holes();
         let view = aslant(&field, [96, 64], 1.0);
@@ -116,7 +118,7 @@ fn what_is_left_out_by_hand_is_not_there() {
         let [plain, foggy, without] = [(0.0, Forced::default()), (3e-4, Forced::default()), (3e-4, forced)]
             .map(|(fog, forced)| Look { fog, forced, ..Look::default() })
             .map(|look| {
-                let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+                let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
                 let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
                 scene.render(technique(&field, "geomipmap", &["block=17"]).as_mut(), &view, 1).unwrap().picture
             });
@@ -140,7 +142,7 @@ fn fog_and_colours_are_seen() {
                 Look { sun_speed: 30.0, ..Look::default() }.after(4.0),
             ]);
         for look in looks {
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
             let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
             pictures.push((look, scene.render(geomipmap.as_mut(), &view, 1).unwrap().picture));
@@ -157,8 +159,9 @@ fn fog_and_colours_are_seen() {
 fn a_field_beyond_one_image_is_paged_and_one_beyond_all_is_refused_by_name() {
     let field = mountains();
     let device = DeviceLimits { image_side: 64, image_layers: 6, filters_heights: true };
-    let plan = ScenePlan::new(&field, &Look::default(), &device).unwrap();
+    let plan = ScenePlan::builder(&field, &Look::default(), &device).build().unwrap();
     assert_eq!((plan.page_size(), plan.pages(), plan.filtered), ([64, 64], [3, 2], false));
-    let refused = ScenePlan::new(&field, &Look::default(), &DeviceLimits { image_layers: 5, ..device }).unwrap_err();
+    let refused =
+        ScenePlan::builder(&field, &Look::default(), &DeviceLimits { image_layers: 5, ..device }).build().unwrap_err();
     assert!(refused.contains("maxImageArrayLayers is 5"), "{refused}");
 }

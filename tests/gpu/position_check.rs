@@ -1,11 +1,12 @@
-//! `position.glsl` and its CPU twin agree to the bit.
+//! `position.glsl` and its CPU reference agree to the bit.
 
 use std::sync::Arc;
 
 use cuesta::draw::layout::{ExplicitVertex, Frame, VertexNormals};
 use cuesta::draw::normals::explicit_normal;
 use cuesta::draw::place::{explicit_height, explicit_position, placed, relative_position};
-use cuesta::draw::skirts::{self, is_skirted};
+use cuesta::draw::skirts::is_skirted;
+use cuesta::draw::weights::{SkirtWeights, SlotWeights};
 use cuesta::draw::{DrawList, Instance, Morph, PipelineRequirements, Seams};
 use cuesta::gpu::Gpu;
 use cuesta::gpu::position_check::{self, Query};
@@ -15,22 +16,24 @@ use cuesta::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 
-/// Every vertex of every third instance that a technique draws, with its weights or made-up ones.
+/// Every vertex of every third instance that a technique draws, with its own weights or random ones.
 fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str], is_made_up: bool) -> Vec<Query> {
     let mut technique = technique(field, name, settings);
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let lattice = &technique.resident().lattice;
     let queries = (1u16..).zip(list.instances.iter().step_by(3)).flat_map(|(k, instance)| {
-        // Any bytes are weights; quadrants of level 0 cannot be finer than it.
+        // Any bytes are valid weights; quadrants of level 0 cannot be finer.
         let random = |word: u32| u32::from(k).wrapping_mul(0x9e37_79b1).rotate_left(8 * word).wrapping_mul(0x85eb_ca6b);
         let finer = if instance.level == 0 { 0x3f3f_3f3f } else { 0xbfbf_bfbf };
-        let mut weights =
-            [random(0) & finer, random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
-        if is_skirted(instance) {
-            skirts::set(&mut weights, random(1), 1.0 + f32::from(k) / 7.0);
-        }
-        let morphing = Instance { weights, ..*instance };
+        let inside = random(0) & finer;
+        let morphing = if is_skirted(instance) {
+            instance.with_weights(SkirtWeights { inside, sides: random(1), depth_m: 1.0 + f32::from(k) / 7.0 })
+        } else {
+            let [first_sides, last_sides, seams] =
+                [random(1) & 0x7f7f_7f7f, random(2) & 0x7f7f_7f7f, random(3) & 0xbfbf_bfbf];
+            instance.with_weights(SlotWeights { inside, first_sides, last_sides, seams })
+        };
         lattice.iter().map(move |v| Query {
             vertex: ExplicitVertex { position: v.position, ..ExplicitVertex::default() },
             normals: VertexNormals::default(),
@@ -44,7 +47,7 @@ fn lattice_queries(field: &Arc<Field>, view: &View, name: &str, settings: &[&str
 /// Lattice vertices of two techniques, and explicit vertices with weights of their own.
 fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
     let forms: &[(&str, &[&str])] = match morph {
-        // Without weights the program does not know of half samples.
+        // Half samples occur only with weights.
         Morph::No => &[("geomipmap", &["block=17"])],
         Morph::ByInstance => &[
             ("geomipmap", &["block=17"]),
@@ -79,7 +82,7 @@ fn queries(field: &Arc<Field>, view: &View, morph: Morph) -> Vec<Query> {
             cells: 64,
             shift: (k % 2) as i32,
             rotation: k % 4,
-            weights: [k, k + 1, k + 2, k + 3].map(|n| n.wrapping_mul(0x9e37_79b1) & 0x7f7f_7f7f),
+            weights_words: [k, k + 1, k + 2, k + 3].map(|n| n.wrapping_mul(0x9e37_79b1) & 0x7f7f_7f7f),
             ..Instance::default()
         },
         explicit_height: 1,
@@ -92,7 +95,7 @@ fn on_the_cpu(field: &Field, frame: &Frame, query: &Query) -> [f32; 3] {
     let vertex = &query.vertex;
     if query.explicit_height == 0 {
         let placed = placed(field, frame, &query.instance, vertex.position);
-        return relative_position(frame, placed.at.map(|n| n << frame.fraction_bits), placed.height);
+        return relative_position(frame, placed.at.map(|n| n << frame.vertices.fraction_bits), placed.height);
     }
     let height = explicit_height(&query.instance, vertex);
     relative_position(frame, explicit_position(frame, &query.instance, vertex), height)
@@ -104,12 +107,13 @@ fn compare(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32) {
     }
 }
 
-fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph, fraction_bits: i32) {
+fn compare_morph(gpu: &Arc<Gpu>, name: &str, field: &Arc<Field>, page_shift: u32, morph: Morph, fraction_bits: u32) {
     let view = aslant(field, [320, 200], 2.0);
-    let frame = Frame { fraction_bits, ..Frame::placing(field, &view) };
-    let mut plan = ScenePlan::new(field, &Look::default(), &gpu.device_limits())
-        .unwrap()
-        .with_requirements(PipelineRequirements { morph, seams: Seams::Skirts, ..PipelineRequirements::default() });
+    let frame = Frame::placing(field, &view).with_fractions(fraction_bits);
+    let mut plan = ScenePlan::builder(field, &Look::default(), &gpu.device_limits())
+        .requirements(PipelineRequirements { morph, seams: Seams::Skirts, ..PipelineRequirements::default() })
+        .build()
+        .unwrap();
     plan.page_shift = page_shift;
     let queries = queries(field, &view, morph);
     let device = position_check::answers(gpu, &plan, field, &frame, &queries).unwrap();

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements, skirts};
+use cuesta::draw::weights::SkirtWeights;
+use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
 use cuesta::lod::Technique;
@@ -31,8 +32,8 @@ impl Technique for Deeper {
     fn select(&mut self, view: &View, list: &mut DrawList) {
         self.inner.select(view, list);
         for instance in &mut list.instances {
-            let [_, sides, depth, _] = instance.weights;
-            skirts::set(&mut instance.weights, sides, self.factor * f32::from_bits(depth));
+            let weights = SkirtWeights::of(instance);
+            *instance = instance.with_weights(SkirtWeights { depth_m: self.factor * weights.depth_m, ..weights });
         }
     }
     fn keeps_tolerance(&self) -> bool {
@@ -50,7 +51,7 @@ fn skirted(field: &Arc<Field>, morph: &str, factor: f32) -> Deeper {
 /// Pixels of a view where the sky shines through.
 fn hole_pixels(gpu: &Arc<Gpu>, field: &Arc<Field>, view: &View, picture: &image::RgbaImage) -> usize {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits()).build().unwrap();
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     Truth::new(&scene, view).unwrap().hole_pixels(&scene, view, picture).unwrap().len()
 }
@@ -96,13 +97,13 @@ fn no_hole_pixels_on_any_field_of_the_invariants() {
         let mut seen = 0;
         for (name, field) in cases::fields() {
             let look = Look::default();
-            let plan = ScenePlan::new(&field, &look, &gpu.device_limits()).unwrap();
+            let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
             let scene = Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let views = views::views(&field).into_iter().map(|(what, view)| (what, views::with_tolerance(&view, 4.0)));
             let truths: Vec<_> = views.map(|(what, view)| (what, view, Truth::new(&scene, &view).unwrap())).collect();
             for morph in ["morph=off", "morph=on"] {
                 let mut technique = skirted(&field, morph, 1.0);
-                let plan = plan.clone().with_requirements(technique.pipeline_requirements());
+                let plan = plan.with_requirements(technique.pipeline_requirements());
                 let mut renderer = Scene { plan: &plan, ..scene.clone() }.renderer(&technique, [320, 180]).unwrap();
                 for (what, view, truth) in &truths {
                     renderer.draw(&mut technique, view, Copy::Picture).unwrap();

@@ -70,8 +70,10 @@ fn next(field: &Field, start: &View, view: &View, random: &mut Random) -> View {
 /// One flight with one technique; bytes on the device while it lasts.
 fn fly(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique, name: &str, random: &mut Random) -> u64 {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
-    let plan = plan.with_requirements(technique.pipeline_requirements());
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits())
+        .requirements(technique.pipeline_requirements())
+        .build()
+        .unwrap();
     let scene = Scene { gpu, field, plan: &plan, look: &look, overlay: None };
     let start = aslant(field, [160, 100], *random.one_of(&[1.0, 2.0, 8.0]));
     let mut renderer = scene.renderer(technique, start.size).unwrap();

@@ -1,10 +1,11 @@
-//! The budget controller against made-up costs: loads that step, climb, spike and swing, curves from nearly flat to
-//! slopes of 10⁴ and stairs, late and noisy costs.
+//! The budget controller against simulated costs: loads that step, ramp, spike and oscillate; curves from nearly flat
+//! to slopes of 10⁴, and staircases; late and noisy costs.
 
 use cuesta::lod::budget::{RANGE_PX, Target};
 use cuesta::stress::simulated_loads::{COST, EVENT, Load, constant, overshoot, power, settling, step};
 
-/// Starts too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px, load)`.
+/// Starts that are too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px,
+/// load)`.
 type Event = (&'static str, usize, f64, Box<dyn Fn(usize) -> f64 + Sync>);
 
 fn events() -> Vec<Event> {
@@ -17,7 +18,7 @@ fn events() -> Vec<Event> {
 }
 
 #[test]
-fn without_noise_it_settles_in_fifteen_frames_and_does_not_overshoot() {
+fn settles_within_fifteen_frames_without_noise() {
     let mut worst = (0.0f64, 0);
     for (slope, delay) in [0.3, 0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
         for (name, event, first_px, factor) in events() {
@@ -32,20 +33,20 @@ fn without_noise_it_settles_in_fifteen_frames_and_does_not_overshoot() {
     println!("overshoot {:.3}, settled in {} frames at most", worst.0, worst.1);
 }
 
-/// Of 200 seeds: the medians, and what 95 % are within.
+/// Returns the median and the 95th percentile.
 fn spread(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     [values[values.len() / 2], values[values.len() * 95 / 100]]
 }
 
 #[test]
-fn with_noise_of_thirty_percent_the_expected_cost_is_held() {
+fn holds_the_expected_cost_with_noise() {
     for (slope, delay) in [0.5, 1.0, 2.0, 4.0].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
         for (name, event, first_px, factor) in events() {
             let of_seed = |seed: u64| {
                 let load = Load { curve: &power(slope), factor: &factor, delay, noise: 0.3, seed };
                 let frames = &load.fly(Target::FrameMs(COST), first_px, 120)[event..];
-                // What was drawn before the change could be known is no overshoot.
+                // Frames drawn before the change could be known do not count as overshoot.
                 let known = if event > 0 { delay + 1 } else { 0 };
                 (overshoot(&frames[known..]), settling(frames, 0.2) as f64)
             };
@@ -59,9 +60,9 @@ fn with_noise_of_thirty_percent_the_expected_cost_is_held() {
     }
 }
 
-/// A controller that acted on each cost would move τ by a third all the time.
+/// A controller that reacted to each cost would move τ by a third in every frame.
 #[test]
-fn noise_alone_makes_no_limit_cycle() {
+fn noise_causes_no_limit_cycle() {
     for delay in [1, 2, 3] {
         let of_seed = |seed: u64| {
             let load = Load { curve: &power(1.0), factor: &constant, delay, noise: 0.3, seed };
@@ -77,9 +78,10 @@ fn noise_alone_makes_no_limit_cycle() {
     }
 }
 
-/// It begins half a factor e beside the target, so that it meets the slope, which it takes for a common one at first.
+/// Starts half a factor e beside the target, so that the controller measures the slope, which it first takes for a
+/// common one.
 #[test]
-fn slopes_up_to_ten_thousand_are_held_once_they_are_known() {
+fn holds_slopes_up_to_ten_thousand() {
     for (slope, delay) in [10.0, 100.0, 1e3, 1e4].into_iter().flat_map(|slope| [1, 2, 3].map(|d| (slope, d))) {
         for factor in [1.5, 3.0, 1.0 / 1.5, 1.0 / 3.0] {
             let load = Load { curve: &power(slope), factor: &step(factor), delay, noise: 0.0, seed: 0 };
@@ -99,25 +101,28 @@ fn slopes_up_to_ten_thousand_are_held_once_they_are_known() {
     }
 }
 
-/// Where the target lies between two stairs, the cheap one is taken, close to the edge, and kept.
+/// With a target between two steps, the tolerance settles on the cheap side, close to the edge.
 #[test]
-fn on_stairs_it_rests_on_the_cheap_side() {
+fn settles_on_the_cheap_side_of_steps() {
     let stairs = |px: f64| 0.7 * COST * 4f64.powf(-(px.log2() / 2.0).floor());
     for (delay, noise, first_px) in [1, 2, 3].into_iter().flat_map(|d| [(d, 0.0, 7.0), (d, 0.0, 0.3), (d, 0.3, 7.0)]) {
         let load = Load { curve: &stairs, factor: &constant, delay, noise, seed: 5 };
         let target = if noise > 0.0 { Target::FrameMs(COST) } else { Target::Triangles(COST) };
         let frames = load.fly(target, first_px, 400);
-        let rested = frames.iter().rposition(|frame| frame.cost > 1.0).unwrap_or(0);
-        let dear = frames.iter().filter(|frame| frame.cost > 1.0).count();
+        let settled = frames.iter().rposition(|frame| frame.cost > 1.0).unwrap_or(0);
+        let expensive = frames.iter().filter(|frame| frame.cost > 1.0).count();
         let last = frames[399];
-        println!("delay {delay}, noise {noise}: {dear} dear frames, the last one {rested}; {last:?}");
+        println!("delay {delay}, noise {noise}: {expensive} expensive frames, the last one {settled}; {last:?}");
         let limit = if noise > 0.0 { 300 } else { 120 };
-        assert!(rested < limit && last.cost == 0.7 && last.px < 1.1, "delay {delay}, noise {noise}: {rested} {last:?}");
+        assert!(
+            settled < limit && last.cost == 0.7 && last.px < 1.1,
+            "delay {delay}, noise {noise}: {settled} {last:?}"
+        );
     }
 }
 
 #[test]
-fn a_single_slow_frame_moves_nothing() {
+fn single_slow_frame_is_ignored() {
     for (delay, spike) in [1, 2, 3].into_iter().flat_map(|d| [(d, 5.0), (d, 0.2)]) {
         let factor = |k: usize| if k == EVENT { spike } else { 1.0 };
         let load = Load { curve: &power(1.5), factor: &factor, delay, noise: 0.0, seed: 0 };
@@ -126,9 +131,9 @@ fn a_single_slow_frame_moves_nothing() {
     }
 }
 
-/// Where nothing can be done, nothing builds up: when the load is back, so is the tolerance.
+/// At the ends of τ's range nothing accumulates: the tolerance returns as soon as the load does.
 #[test]
-fn it_does_not_wind_up_at_the_ends() {
+fn no_windup_at_the_ends_of_the_range() {
     for (delay, factor) in [1, 2, 3].into_iter().flat_map(|d| [(d, 1e4), (d, 1e-4)]) {
         let load = |k: usize| if (EVENT..3 * EVENT).contains(&k) { factor } else { 1.0 };
         let load = Load { curve: &power(1.0), factor: &load, delay, noise: 0.0, seed: 0 };
@@ -143,7 +148,7 @@ fn it_does_not_wind_up_at_the_ends() {
 }
 
 #[test]
-fn slow_changes_are_followed() {
+fn follows_slow_changes() {
     for delay in [1, 2, 3] {
         let ramp = |k: usize| 1.02f64.powi(k.clamp(EVENT, 2 * EVENT) as i32 - EVENT as i32);
         let swing = |k: usize| 1.0 + 0.3 * (k as f64 * std::f64::consts::TAU / 40.0).sin();
@@ -152,16 +157,16 @@ fn slow_changes_are_followed() {
             let frames = load.fly(Target::Triangles(COST), 1.0, 240);
             let worst = frames[EVENT..].iter().map(|frame| (frame.cost - 1.0).abs()).fold(0.0, f64::max);
             println!("delay {delay}, {name}: {worst:.3}");
-            // What changes in the frames until it is known: 2 % a frame, and 0.3 · 2π / 40 = 4.7 %.
+            // Change of the load until it is known: 2 % a frame, and 0.3 · 2π / 40 = 4.7 %.
             let limit = if name == "ramp" { 0.03 } else { 0.055 } * (delay as f64 + 1.0);
             assert!(worst <= limit, "delay {delay}, {name}: {worst}");
         }
     }
 }
 
-/// A load that falls while τ moves leaves what was too dear at finer levels behind: it must not hold τ back.
+/// If the load falls while τ moves, old bounds at finer levels must not hold τ back.
 #[test]
-fn slow_first_frames_do_not_hold_it_back() {
+fn recovers_from_slow_first_frames() {
     let curve = |px: f64| 0.36 * COST + 2.3 * COST / (1.0 + px);
     for delay in [1, 2, 3] {
         let factor = |k: usize| if k < 3 { 10.0 } else { 1.0 };

@@ -1,4 +1,4 @@
-//! The budget controller on techniques that have one: a circle flown low over real shapes of land, at several targets.
+//! The budget controller on real techniques: a circle flown low over terrain, at several targets.
 
 use std::sync::Arc;
 
@@ -11,14 +11,14 @@ use rayon::prelude::*;
 
 use super::technique;
 
-/// Triangles to hold.
+/// Target numbers of triangles.
 const TARGETS: [f64; 3] = [4e4, 8e4, 16e4];
-/// Of a thousand frames, those that are flown.
+/// Number of frames flown of the path's thousand.
 const FLOWN: usize = 100;
 /// Frames in which the controller settles.
 const SETTLING: usize = 15;
 
-/// Triangles over the target, frame by frame.
+/// Returns the triangles relative to the target, frame by frame.
 fn flown(field: &Arc<Field>, name: &str, settings: &[&str], target: f64, views: &[View]) -> Vec<f64> {
     let mut technique = technique(field, name, settings);
     let mut controller = Controller::new(Target::Triangles(target), 1.0, RANGE_PX);
@@ -33,22 +33,22 @@ fn flown(field: &Arc<Field>, name: &str, settings: &[&str], target: f64, views: 
     views.iter().map(frame).collect()
 }
 
-/// Where whole pages or blocks come into sight the load jumps by what they hold: one frame is off before it is known.
+/// The load jumps if whole pages or blocks come into view; one frame is off before that is known.
 #[test]
-fn targets_are_held_along_a_circle() {
+fn holds_targets_along_a_circle() {
     let mut field = synth::synth(synth::Kind::Eroded, [1025, 1025], 7);
     field.spacing = [10.0, 10.0];
     let field = Arc::new(field);
     let tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
     let mut views = paths::find("circle").expect("a named path").views(&field, 1000, [1280, 720], tolerance);
     views.truncate(FLOWN);
-    let rooms: [(&str, &[&str]); 4] = [
+    let techniques: [(&str, &[&str]); 4] = [
         ("sorted-strips", &[]),
         ("clusters", &["block=8"]),
         ("geomipmap", &["block=9"]),
         ("smooth-tiles", &["tile=9"]),
     ];
-    let cases: Vec<_> = rooms.iter().flat_map(|room| TARGETS.map(|target| (*room, target))).collect();
+    let cases: Vec<_> = techniques.iter().flat_map(|form| TARGETS.map(|target| (*form, target))).collect();
     let report = |&((name, settings), target): &((&str, &[&str]), f64)| {
         let costs = flown(&field, name, settings, target, &views);
         let after = &costs[SETTLING..];

@@ -1,4 +1,4 @@
-//! Clusters: every way to draw them draws the same triangles, at far fewer draws.
+//! Clusters: all variants draw the same triangles, with far fewer draws than blocks.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -6,7 +6,8 @@ use std::sync::Arc;
 use cuesta::bench::paths;
 use cuesta::draw::expand;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology, weights};
+use cuesta::draw::weights::SlotWeights;
+use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology};
 use cuesta::height::bounds::{Bounds, Measure};
 use cuesta::height::progress::Progress;
 use cuesta::height::synth::{Kind, synth};
@@ -19,13 +20,13 @@ use glam::DVec3;
 
 use super::{heights, technique};
 
-/// A deterministic number in 0..1.
+/// Returns a deterministic number in 0..1.
 fn random(seed: &mut u64) -> f64 {
     *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
     (*seed >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Land whose roughness changes from square to square, with holes or without.
+/// Returns terrain whose roughness changes from square to square, with holes or without.
 fn terrain(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
     let count = (size[0] * size[1]) as usize;
     let roughness: Vec<f64> = (0..32 * 32).map(|_| 100.0 * random(seed).powi(12)).collect();
@@ -39,8 +40,9 @@ fn terrain(seed: &mut u64, size: [u32; 2]) -> Arc<Field> {
     Arc::new(Field::new(Samples::F32(heights), size, [3.0, 2.0], holes))
 }
 
-/// From within the field, or all of it through parallel rays, where the tolerance is the same everywhere.
-fn anywhere(field: &Field, seed: &mut u64) -> View {
+/// Returns a view from within the field, or an orthographic view of all of it, where the tolerance is the same
+/// everywhere.
+fn random_view(field: &Field, seed: &mut u64) -> View {
     let [w, h] = field.size().map(f64::from);
     let eye = field.world_at(w * random(seed), h * random(seed), 20.0 + 300.0 * random(seed).powi(3));
     let near = View {
@@ -59,10 +61,10 @@ fn anywhere(field: &Field, seed: &mut u64) -> View {
     View { eye: field.world_at(w / 2.0, h / 2.0, 0.0) - far.forward() * 2000.0, ..far }
 }
 
-/// Corners of a triangle: position and the height's bits.
+/// Corners of a triangle: position, and the height as bits.
 type Corners = [(i32, i32, u32); 3];
 
-/// The triangles in order, and the draws.
+/// Returns the triangles sorted, and the list.
 fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Corners>, DrawList) {
     let mut list = DrawList::default();
     technique.select(view, &mut list);
@@ -78,7 +80,7 @@ fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Corn
 }
 
 #[test]
-fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance() {
+fn all_modes_draw_the_same_triangles_within_the_tolerance() {
     let mut seed = 11;
     let (mut blocks, mut clusters, mut kinds, mut closest) = (0, 0, BTreeSet::new(), 0.0f64);
     for k in 0..60 {
@@ -88,7 +90,7 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
         let mut modes = ["clusters", "clusters:draw-per-cluster", "clusters:draw-per-block"]
             .map(|m| technique(&field, m, &settings));
         for _ in 0..20 {
-            let view = anywhere(&field, &mut seed);
+            let view = random_view(&field, &mut seed);
             let [(indirect, list), (cluster, each), (block, single)] =
                 modes.each_mut().map(|mode| drawn(&field, mode.as_mut(), &view));
             assert!(indirect == cluster, "draw-per-cluster draws other triangles");
@@ -114,14 +116,14 @@ fn a_thousand_quadtrees_are_drawn_alike_in_every_mode_and_within_the_tolerance()
         }
     }
     println!("{blocks} blocks in {clusters} clusters of {} kinds, {closest} of the tolerance", kinds.len());
-    assert!(closest > 0.9, "the bound is no trivial one: {closest} of the tolerance");
+    assert!(closest > 0.9, "the bound is not tight: {closest} of the tolerance");
     assert!(kinds.len() == 23, "only {} kinds of clusters occurred", kinds.len());
     assert!(clusters * 3 < blocks, "{clusters} clusters for {blocks} blocks");
 }
 
-/// Land so gentle that distance alone tells the levels: many meet in one view.
+/// Terrain so smooth that distance alone determines the levels, so that many meet in one view.
 #[test]
-fn by_distance_levels_meet_without_a_crack_and_within_the_tolerance() {
+fn morph_by_distance_is_watertight_and_within_the_tolerance() {
     let (mut seed, mut meeting) = (23, 0);
     for k in 0..4 {
         let size = [[257, 257], [257, 200], [230, 257], [129, 257]][k];
@@ -131,7 +133,7 @@ fn by_distance_levels_meet_without_a_crack_and_within_the_tolerance() {
         let settings = ["block=8", "morph=distance"];
         let mut modes = ["clusters", "clusters:draw-per-block"].map(|mode| technique(&field, mode, &settings));
         for _ in 0..20 {
-            let view = anywhere(&field, &mut seed);
+            let view = random_view(&field, &mut seed);
             let [(clusters, list), (blocks, _)] = modes.each_mut().map(|mode| drawn(&field, mode.as_mut(), &view));
             assert!(clusters == blocks, "draw-per-block draws other triangles");
             let proof = watertight::prove_list(&field, &view, Seams::Shared, modes[0].resident(), &list);
@@ -146,7 +148,7 @@ fn by_distance_levels_meet_without_a_crack_and_within_the_tolerance() {
 }
 
 #[test]
-fn every_frame_of_skim_and_circle_is_drawn_alike_in_every_mode() {
+fn all_modes_draw_the_same_along_paths() {
     let mut field = synth(Kind::Eroded, [513, 513], 7);
     field.spacing = [25.0; 2];
     let field = Arc::new(field);
@@ -164,7 +166,7 @@ fn every_frame_of_skim_and_circle_is_drawn_alike_in_every_mode() {
     }
 }
 
-/// Flat but for a rough spot on each side of the squares of sixteen samples.
+/// Returns a field that is flat except for a rough spot on each side of the squares of sixteen samples.
 fn rough_spots(seed: &mut u64) -> Field {
     let (reach, along) = (2 + (*seed >> 40) as u32 % 3, 2 + (*seed >> 44) as u32 % 11);
     let spot = |a: u32, b: u32| (a + 2) % 16 < 5 && b % 16 >= along && b % 16 < along + reach;
@@ -173,21 +175,21 @@ fn rough_spots(seed: &mut u64) -> Field {
     Field::new(Samples::F32((0..129 * 129).map(height).collect()), [129; 2], [1.0; 2], Holes::none(129 * 129))
 }
 
-/// The four blocks in a node on their way into it, anywhere on it: within the node's error.
+/// Checks that the four blocks in a node stay within the node's error at any morph weights.
 #[test]
-fn no_weights_exceed_the_error() {
+fn no_morph_weights_exceed_the_error() {
     let (mut seed, mut closest) = (5, [0.0f64; 4]);
     let mesh = Mesh::new(16, &[[1, 0, 0, 0]], Seams::Shared);
     for _ in 0..20 {
         let field = rough_spots(&mut seed);
-        let view = anywhere(&field, &mut seed);
+        let view = random_view(&field, &mut seed);
         let bounds =
             Bounds::new(&field, Measure { cells: 8, growth: 1.0, errors: true, morph: true }, &Progress::default());
         for level in 1..4u32 {
             let nodes = 128 >> (3 + level);
             for (node, draw) in (0..nodes * nodes).flat_map(|node| (0..8).map(move |draw| (node, draw))) {
                 let at = [node % nodes, node / nodes];
-                // A side is beyond the next level only if the inside is on its way.
+                // A side is beyond the next level only if the inside is morphing.
                 let inside = [0, 0, 0, 63, 0, 17, 40, 63][draw];
                 let sides = [
                     [0; 4],
@@ -204,9 +206,9 @@ fn no_weights_exceed_the_error() {
                     cells: 32,
                     level: level - 1,
                     shift: level as i32 - 2,
-                    weights: weights::uniform(inside, sides),
                     ..Instance::default()
                 };
+                let instance = instance.with_weights(SlotWeights::uniform(inside, sides));
                 let indices = mesh.ranges[0].clone();
                 let draws = vec![Draw {
                     source: Source::Lattice,
@@ -226,14 +228,14 @@ fn no_weights_exceed_the_error() {
             }
         }
     }
-    // And the errors are no more than needed.
+    // The bound must also be tight.
     assert!(closest[2..].iter().all(|&share| share > 0.97), "{closest:?} of the error");
 }
 
-/// Straight down on land so steep that it stays in front of the eye under no finite tolerance with few enough blocks: the
-/// paper's metric decides.
+/// A view straight down on terrain so steep that its error in front of the eye exceeds every finite tolerance with few
+/// enough blocks. The paper's metric must be used.
 #[test]
-fn where_no_certified_tolerance_fits_the_papers_metric_decides() {
+fn paper_metric_is_used_if_no_certified_tolerance_fits() {
     let field = Arc::new(synth(Kind::Checker, [4097, 1537], 1));
     let view = View {
         eye: DVec3::new(2048.0, 33_000.0, 768.0),
@@ -254,7 +256,7 @@ fn where_no_certified_tolerance_fits_the_papers_metric_decides() {
         let mut technique = technique(&field, name, settings);
         let mut list = DrawList::default();
         technique.select(&view, &mut list);
-        println!("{name} {settings:?}: {} times as wide, {} triangles", list.tolerance_scale, list.triangles());
+        println!("{name} {settings:?}: {} times the tolerance, {} triangles", list.tolerance_scale, list.triangles());
         assert!(technique.limits().hold(&list.size()), "{name} {settings:?}");
         assert!(list.tolerance_scale == f64::INFINITY && list.triangles() > 100, "{name} {settings:?}");
     }

@@ -1,4 +1,5 @@
-//! Spheres over a land without samples: the bound against the land itself, from space to a stone.
+//! Sphere tree over procedural terrain: checks the error bound against the terrain itself, at heights from 400 km to
+//! less than a metre.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -19,13 +20,13 @@ fn terrain() -> Arc<Field> {
     Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS))))
 }
 
-/// From so far above one place, looking past it.
+/// Returns a view from this height above a fixed place.
 fn view(field: &Field, above_m: f64, yaw: f64) -> View {
     let at = DVec3::new(0.43, 0.0, 0.37) * SIDE_M;
     let ground = field.height_at(at.x, at.z).expect("over the land");
     View {
         eye: DVec3::new(at.x, ground + above_m, at.z),
-        // From space the land is below; further down its horizon is in the picture.
+        // High above, the terrain is below; nearer to it, the horizon is in the picture.
         world_from_eye: View::turned(yaw, if above_m > 1e5 { -75.0 } else { -15.0 }, 0.0),
         lens: Lens::Perspective { fov_x: 1.0 },
         size: [320, 200],
@@ -49,7 +50,7 @@ fn drawn(field: &Field, technique: &mut dyn Technique, view: &View) -> Vec<Drawn
     expand::triangles(field, &Frame::placing(field, view), technique.resident(), &list)
 }
 
-/// The list's triangles in the world, as exact as they reach the device.
+/// Returns the list's triangles in world coordinates, at the precision that reaches the device.
 fn world(list: &DrawList) -> Vec<[DVec3; 3]> {
     let corner = |vertex: &ExplicitVertex| {
         let [x, z] = vertex.position.map(|n| f64::from(n) * SPACING_M);
@@ -62,21 +63,21 @@ fn world(list: &DrawList) -> Vec<[DVec3; 3]> {
     indices.as_chunks().0.iter().map(corners).collect()
 }
 
-/// Heights of the zoom, metres.
+/// Heights of the eye above the terrain, metres.
 fn zoom() -> impl Iterator<Item = f64> {
     (0..13).map(|k| 4e5 * 0.3f64.powi(k))
 }
 
 #[test]
-fn the_tolerance_is_kept_against_the_terrain_itself_from_space_to_a_stone() {
+fn tolerance_is_kept_at_all_heights() {
     let field = terrain();
     let bezier = Arc::clone(field.procedural().expect("endless"));
     for morph in ["morph=off", "morph=on"] {
-        let mut room = super::technique(&field, "sphere-tree", &[morph]);
+        let mut technique = super::technique(&field, "sphere-tree", &[morph]);
         let mut dice = fastrand::Rng::with_seed(3);
         for above_m in zoom() {
             let view = view(&field, above_m, 40.0);
-            let triangles = world(&selected(&mut *room, &view));
+            let triangles = world(&selected(&mut *technique, &view));
             let (worst, seen) = worst_px(&bezier, &view, &triangles, &mut dice);
             println!("{morph}, {above_m:9.3} m: {} triangles, {worst:.3} px at {seen} places", triangles.len());
             assert!(worst <= TOLERANCE_PX, "{above_m} m: {worst} px");
@@ -85,7 +86,7 @@ fn the_tolerance_is_kept_against_the_terrain_itself_from_space_to_a_stone() {
     }
 }
 
-/// The largest error at random places of triangles in the picture, pixels, and the number of places.
+/// Returns the largest error at random places of visible triangles, pixels, and the number of places.
 fn worst_px(terrain: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut fastrand::Rng) -> (f64, usize) {
     let (mut worst, mut seen) = (0.0f64, 0);
     for &[a, b, c] in triangles {
@@ -105,10 +106,10 @@ fn worst_px(terrain: &Bezier, view: &View, triangles: &[[DVec3; 3]], dice: &mut 
     (worst, seen)
 }
 
-/// Less than half a millimetre above land that is thousands of metres high, single precision of heights above zero would be worth
-/// pixels: they are relative to the eye's.
+/// Less than half a millimetre above terrain that is thousands of metres high. Single precision of absolute heights
+/// would cause errors of pixels, but heights are relative to the eye's.
 #[test]
-fn the_tolerance_is_kept_nearer_than_single_precision_of_heights() {
+fn tolerance_is_kept_below_single_precision_of_heights() {
     let field = terrain();
     let bezier = Arc::clone(field.procedural().expect("endless"));
     for morph in ["morph=off", "morph=on"] {
@@ -126,15 +127,15 @@ fn the_tolerance_is_kept_nearer_than_single_precision_of_heights() {
     }
 }
 
-/// No vertex lies within a side of a triangle, and all land in the picture is drawn.
+/// Checks that no vertex lies within a side of a triangle, and that all visible terrain is drawn.
 #[test]
-fn the_mesh_conforms_and_covers_what_is_in_sight() {
+fn mesh_conforms_and_covers_the_view() {
     let field = terrain();
-    let mut room = super::technique(&field, "sphere-tree", &[]);
+    let mut technique = super::technique(&field, "sphere-tree", &[]);
     let mut dice = fastrand::Rng::with_seed(5);
     for above_m in zoom() {
         let view = view(&field, above_m, 130.0);
-        let triangles = drawn(&field, &mut *room, &view);
+        let triangles = drawn(&field, &mut *technique, &view);
         let vertices: HashSet<[i32; 2]> = triangles.iter().flat_map(|t| t.corners.map(|c| [c.x, c.z])).collect();
         for corners in triangles.iter().map(|t| t.corners.map(|c| [c.x, c.z])) {
             for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
@@ -145,7 +146,7 @@ fn the_mesh_conforms_and_covers_what_is_in_sight() {
         }
         let mut seen = 0;
         for _ in 0..4000 {
-            // Dense about the eye, and out to the horizon.
+            // Dense around the eye, and out to the horizon.
             let (turn, far_m) = (dice.f64() * std::f64::consts::TAU, above_m * 10f64.powf(4.0 * dice.f64() - 1.0));
             let [x, z] = [view.eye.x + far_m * turn.cos(), view.eye.z + far_m * turn.sin()];
             let Some(y) = field.height_at(x, z) else { continue };
@@ -166,18 +167,18 @@ fn covers(triangle: &Drawn, at: DVec2) -> bool {
 }
 
 #[test]
-fn crossings_are_found_alike_and_returning_draws_the_same() {
+fn all_criteria_draw_the_same_on_procedural_terrain() {
     let field = terrain();
     let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
-    let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion]));
+    let mut techniques = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion]));
     let mut dice = fastrand::Rng::with_seed(8);
     let mut view = view(&field, 40.0, 10.0);
     for step in 0..60 {
         let fall = if step == 30 { 3000.0 } else { 3.0 };
         view.eye += DVec3::new(dice.f64() - 0.5, dice.f64() - 0.5, dice.f64() - 0.5) * fall;
-        let lists = rooms.each_mut().map(|room| {
+        let lists = techniques.each_mut().map(|technique| {
             let mut list = DrawList::default();
-            room.select(&view, &mut list);
+            technique.select(&view, &mut list);
             list
         });
         for list in &lists {

@@ -1,4 +1,4 @@
-//! Fields as large as lattice coordinates allow: the last pages and blocks end beyond them.
+//! Fields as large as lattice coordinates allow, in which the last pages and blocks extend beyond them.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use cuesta::lod::{self, Settings};
 use cuesta::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
-/// Near the last corner, looking out of the field and down, and then in, near the first corner, and over the middle.
+/// Returns views near the last corner, out of the field, down and into it, near the first corner, and over the middle.
 fn views(field: &Field) -> Vec<View> {
     let last = field.size().map(|n| f64::from(n - 1));
     let at = |share: f64, above_m: f64| {
@@ -36,7 +36,7 @@ fn views(field: &Field) -> Vec<View> {
 }
 
 #[test]
-fn every_technique_draws_or_refuses_fields_of_the_largest_side() {
+fn techniques_draw_or_reject_largest_fields() {
     let mut drawn = 0;
     let long = |size: [u32; 2], sides: [u32; 2]| {
         let tiles = [0, 1].map(|k| sides[k] / size[k]);
@@ -44,11 +44,11 @@ fn every_technique_draws_or_refuses_fields_of_the_largest_side() {
     };
     let fields = [
         long([64, 64], [MAX_SIDE; 2]),
-        // A last block that the field's end cuts.
+        // The field's end cuts the last block.
         long([63, 61], [MAX_SIDE; 2]),
         long([64, 32], [MAX_SIDE, 32]),
         long([32, 64], [32, MAX_SIDE]),
-        // As large as strips may be.
+        // Maximum size for sorted strips.
         long([64, 64], [1 << 22; 2]),
     ];
     for field in fields {
@@ -68,9 +68,9 @@ fn every_technique_draws_or_refuses_fields_of_the_largest_side() {
             let entry = lod::find(name).expect("in the table");
             let choices: Vec<_> = (!key.is_empty()).then(|| (key.to_owned(), word.to_owned())).into_iter().collect();
             let settings = Settings::new(entry, None, &choices).expect("the table's own values");
-            // A technique that goes through all samples refuses these fields.
+            // Techniques that visit all samples reject these fields.
             let Ok(mut technique) = entry.prepare(&field, &settings) else { continue };
-            // Strips take seconds where much land is in sight.
+            // Strips take seconds if much terrain is visible.
             let views = views(&field);
             let views = if name == "sorted-strips" { &views[..2] } else { &views };
             for (k, view) in views.iter().enumerate() {

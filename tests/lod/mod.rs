@@ -1,4 +1,4 @@
-//! What single techniques promise beyond the laws of `conformance`.
+//! Properties of single techniques beyond the invariants of `conformance`.
 
 mod budget;
 mod budget_circle;
@@ -26,7 +26,7 @@ use cuesta::height::{Field, surface};
 use cuesta::lod::{self, Settings, Technique};
 use cuesta::view::View;
 
-/// A technique, or a variant as `technique:variant`, with settings given as `key=value`.
+/// Builds a technique, or a variant given as `technique:variant`, with settings given as `key=value`.
 fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
     let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
     let entry = lod::find(name).expect("in the table");
@@ -35,8 +35,8 @@ fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Techn
     (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).expect("the table's own values"))
 }
 
-/// The drawn height above every sample, the higher one where one edge lies above another; not a number where nothing is
-/// drawn.
+/// Returns the drawn height at every sample, the higher one if one edge lies above another; NaN if nothing is drawn
+/// there.
 fn heights(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Vec<f64> {
     let [w, h] = field.size();
     let mut heights = vec![f64::NAN; (w * h) as usize];

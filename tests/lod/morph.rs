@@ -1,8 +1,8 @@
-//! Morphing: it ends where the next level begins, and nothing jumps on the way.
+//! Morphing: a morph ends exactly at the next level, and nothing jumps during it.
 
 use std::sync::Arc;
 
-use cuesta::draw::weights::{self, ONE};
+use cuesta::draw::weights::{ONE, SlotWeights};
 use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
 use cuesta::height::{Field, synth};
 use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::{heights, technique};
 
-/// Mountains of whole blocks: what sticks out does not morph inside.
+/// Returns terrain that consists of whole blocks, because partial ones do not morph inside.
 fn terrain() -> Arc<Field> {
     let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 5);
     field.spacing = [20.0, 20.0];
@@ -30,13 +30,13 @@ fn view(eye: DVec3, target: DVec3, px: f64) -> View {
     }
 }
 
-/// A block of 16 cells at a level, its sides as far beyond the level as said.
+/// Returns a block of 16 cells at a level with these morph weights.
 fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph: [f32; 4]) -> DrawList {
     let mask: u8 = (0..4).filter(|&k| edge_morph[k] >= 1.0).map(|k| 1 << k).sum();
     let rotation = u32::from(16 >> level == 1 && (origin[0] + origin[1]) / 16 % 2 == 1);
     let weight = |w: f32| (w * ONE as f32) as u32;
-    let weights = weights::uniform(weight(morph), edge_morph.map(weight));
-    let instance = Instance { origin, cells: 16, rotation, level, weights, ..Instance::default() };
+    let weights = SlotWeights::uniform(weight(morph), edge_morph.map(weight));
+    let instance = Instance { origin, cells: 16, rotation, level, ..Instance::default() }.with_weights(weights);
     let ranges = [&mesh.borders[level as usize][usize::from(mask)], &mesh.centres[level as usize]];
     let draws = ranges.map(|indices| Draw {
         source: Source::Lattice,
@@ -49,7 +49,7 @@ fn block(mesh: &BlockMesh, origin: [i32; 2], level: u32, morph: f32, edge_morph:
 }
 
 #[test]
-fn at_its_end_a_morph_is_the_next_level() {
+fn morph_ends_at_the_next_level() {
     let (field, mesh) = (terrain(), BlockMesh::new(16, Masks::Sixteen));
     let anywhere = view(DVec3::ZERO, DVec3::X, 1.0);
     let surface = |list: &DrawList| heights(&field, &anywhere, &mesh.geometry, list);
@@ -72,12 +72,13 @@ fn at_its_end_a_morph_is_the_next_level() {
     }
 }
 
-/// The largest displacement on the screen, pixels, by a change of levels alone, along a slow way to the land.
+/// Returns the largest displacement on the screen, pixels, that changes of levels cause while the eye slowly
+/// approaches.
 fn largest_jump(field: &Arc<Field>, name: &str, settings: &[&str]) -> f64 {
     let mut technique = technique(field, name, settings);
     let target = field.world_at(128.0, 128.0, 500.0);
     let mut frame = |k: u32| {
-        // Half a per cent nearer each time.
+        // Half a per cent nearer per frame.
         let away = 9000.0 * 0.995f64.powi(k as i32);
         let view = view(target + DVec3::new(-0.7, 0.5, 0.6) * away, target, 2.0);
         let mut list = DrawList::default();
@@ -99,11 +100,11 @@ fn largest_jump(field: &Arc<Field>, name: &str, settings: &[&str]) -> f64 {
     largest
 }
 
-/// Of a tolerance of 2 px.
+/// Maximum displacement, pixels, at a tolerance of 2 px.
 const JUMP_PX: f64 = 0.15;
 
 #[test]
-fn on_a_slow_way_nothing_jumps() {
+fn geomipmap_does_not_jump() {
     let field = terrain();
     for distance in ["error", "linear", "exponential"] {
         let settings = ["block=17", "base=60", &format!("distance={distance}"), "morph=off"];
@@ -116,7 +117,7 @@ fn on_a_slow_way_nothing_jumps() {
 }
 
 #[test]
-fn clusters_do_not_jump_either() {
+fn clusters_do_not_jump() {
     let field = terrain();
     for (block, seams) in [("block=8", "stitched"), ("block=16", "stitched"), ("block=8", "skirts")] {
         let seams = format!("seams={seams}");
@@ -133,7 +134,7 @@ fn clusters_do_not_jump_either() {
 }
 
 #[test]
-fn nor_do_smooth_tiles() {
+fn smooth_tiles_do_not_jump() {
     let field = terrain();
     for clock in ["clock=speed", "clock=time", "clock=frames"] {
         let [off, on] =

@@ -1,4 +1,4 @@
-//! Settings that are listed as idle beside others do nothing.
+//! Checks that settings listed as idle beside others have no effect.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use cuesta::view::{Lens, Metric, Tolerance, View};
 
 use super::technique;
 
-/// Other values than the default.
+/// Returns values other than the default.
 fn values(values: Values, default: &str) -> Vec<String> {
     let all = match values {
         Values::Words(words) => words.iter().map(|word| word.to_string()).collect(),
@@ -20,7 +20,7 @@ fn values(values: Values, default: &str) -> Vec<String> {
     all.into_iter().filter(|value| value != default).collect()
 }
 
-/// Hashes of the triangles of a technique on a way over land, frame by frame.
+/// Returns a hash of a technique's triangles for each frame of a flight.
 fn flown(name: &str, settings: &[String]) -> Vec<u64> {
     let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 7);
     field.spacing = [10.0, 10.0];
@@ -53,7 +53,7 @@ fn flown(name: &str, settings: &[String]) -> Vec<u64> {
 }
 
 #[test]
-fn what_is_said_to_do_nothing_does_nothing() {
+fn idle_settings_have_no_effect() {
     let mut tried = 0;
     for entry in TECHNIQUES {
         let setting = |key: &str| entry.settings.iter().find(|s| s.key == key).expect("one of the entry's settings");
@@ -70,7 +70,7 @@ fn what_is_said_to_do_nothing_does_nothing() {
                     tried += 1;
                 }
             }
-            // And beside the right word it does something, but for what only sends the same triangles in parts.
+            // Beside the right word the setting has an effect, except `parts`, which sends the same triangles in parts.
             let beside = format!("{}={}", other.key, words[0]);
             let differs = |value: &String| {
                 flown(entry.name, &[beside.clone(), format!("{key}={value}")])

@@ -1,4 +1,4 @@
-//! What a field does not need, techniques do not prepare; and what they draw is the same.
+//! Techniques omit data that a field does not need, and draw the same without it.
 
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ fn prepared(field: &Arc<Field>, name: &str, setting: (&str, &str)) -> Box<dyn lo
     entry.prepare(field, &settings).unwrap()
 }
 
-/// Folds along z, eight cells apart and straight between them: exact three levels up, and two levels up beside blocks
-/// that are coarser still.
+/// Returns a field folded along z, with folds eight cells apart. It is exact three levels up, and two levels up beside
+/// blocks that are coarser still.
 fn folded(size: u32) -> Arc<Field> {
     let fold = |n: u32| (n * n % 7) as f32;
     let height = |x: u32| fold(x / 8) + (fold(x / 8 + 1) - fold(x / 8)) * (x % 8) as f32 / 8.0;
@@ -21,7 +21,7 @@ fn folded(size: u32) -> Arc<Field> {
 }
 
 #[test]
-fn indices_of_levels_and_borders_that_nothing_uses_are_not_there() {
+fn unused_indices_are_omitted() {
     let rough = Arc::new(synth::synth(synth::Kind::Fractal, [129, 129], 3));
     let flat = Arc::new(synth::synth(synth::Kind::Flat, [129, 129], 3));
     let tile = Arc::new(synth::synth(synth::Kind::Flat, [33, 33], 3));

@@ -1,9 +1,9 @@
-//! Quadrants with skirts lie where Judnich & Ling's equations 3 and 4 say.
+//! Vertices of quadrants with skirts are placed by equations 3 and 4 of Judnich & Ling.
 
 use cuesta::draw::layout::Frame;
 use cuesta::draw::place::placed;
 use cuesta::draw::skirts::{self, SKIRT};
-use cuesta::draw::weights::{self, FINER, ONE};
+use cuesta::draw::weights::{FINER, ONE, SkirtWeights};
 use cuesta::draw::{Instance, Seams};
 use cuesta::height::surface::{Corner, doubled_area};
 use cuesta::height::{Field, Holes, Samples, rtin};
@@ -16,7 +16,7 @@ fn rough() -> Field {
     Field::new(Samples::F32((0..65 * 65).map(height).collect()), [65; 2], [1.0; 2], Holes::none(65 * 65))
 }
 
-/// Height of a level's surface over a sample.
+/// Returns the height of a level's surface at a sample.
 fn level_height(field: &Field, level: u32, [x, z]: [i32; 2]) -> f64 {
     let last = (64 >> level) - 1;
     let [i, j] = [x, z].map(|n| (n >> level).min(last));
@@ -35,7 +35,7 @@ fn level_height(field: &Field, level: u32, [x, z]: [i32; 2]) -> f64 {
     rtin::cell(i, j).map(|t| t.map(corner)).into_iter().find_map(inside).expect("a triangle of the cell")
 }
 
-/// Equation 4, the height functions from low to high resolution.
+/// Equation 4: interpolates the height functions from low to high resolution.
 fn equation_4(alpha: f64, [h0, h1, h2]: [f64; 3]) -> f64 {
     let saturate = |n: f64| n.clamp(0.0, 1.0);
     let (a, b) = (saturate(2.0 * alpha), saturate(2.0 * alpha - 1.0));
@@ -43,7 +43,7 @@ fn equation_4(alpha: f64, [h0, h1, h2]: [f64; 3]) -> f64 {
 }
 
 #[test]
-fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
+fn vertices_follow_their_quadrants_alpha() {
     let (field, n) = (rough(), 8);
     let view = View {
         eye: DVec3::new(3.0, 400.0, 20.0),
@@ -59,18 +59,17 @@ fn every_vertex_lies_as_its_own_quadrants_alpha_says() {
     let mesh = Mesh::new(n, &states, Seams::Skirts);
     let (mut compared, mut skirt_vertex) = (0, 0);
     for (k, rotation) in (0..2).flat_map(|k| (0..4).map(move |rotation| (k, rotation))) {
-        // The quadrants after the turn, and how far each has gone over into the next coarser level.
-        let state = cuesta::lod::clusters::states::turned(states[k], rotation);
+        // The quadrants after rotation, and the morph weight of each towards the next coarser level.
+        let state = cuesta::lod::clusters::states::rotated(states[k], rotation);
         let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * rotation) % ONE);
-        let mut weights = [0; 4];
-        for quadrant in 0..4 {
+        let inside = [0, 1, 2, 3].map(|quadrant: usize| {
             let finer = if state[quadrant] == 2 { FINER } else { 0 };
-            weights::set(&mut weights, weights::inside(quadrant), gone[quadrant] | finer);
-        }
-        skirts::set(&mut weights, 0x9c35, 2.5);
+            (gone[quadrant] | finer) as u8
+        });
+        let weights = SkirtWeights { inside: u32::from_le_bytes(inside), sides: 0x9c35, depth_m: 2.5 };
         let cells = skirts::cells(2 * n as u32);
-        let instance =
-            Instance { origin: [32, 0], cells, shift: 0, rotation, level: 1, weights, ..Instance::default() };
+        let instance = Instance { origin: [32, 0], cells, rotation, level: 1, ..Instance::default() };
+        let instance = instance.with_weights(weights);
         for &index in &mesh.geometry.indices[mesh.ranges[k].start as usize..mesh.ranges[k].end as usize] {
             let position = mesh.geometry.lattice[index as usize].position;
             let found = placed(&field, &frame, &instance, position);

@@ -1,11 +1,12 @@
-//! Smooth tiles whatever the viewer and the clock do: one surface in every frame, and the bound wherever nothing waits.
+//! Smooth tiles: checks that the surface is watertight in every frame, for any movement and clock, and that the error
+//! bound holds whenever nothing is pending.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use cuesta::bench::paths;
 use cuesta::draw::layout::Frame;
-use cuesta::draw::weights::{ONE, get, inside};
+use cuesta::draw::weights::{ONE, Slot, SlotWeights};
 use cuesta::draw::{DrawList, expand};
 use cuesta::height::{Field, Holes, Samples, synth};
 use cuesta::lod::Technique;
@@ -16,10 +17,10 @@ use rayon::prelude::*;
 
 use super::{heights, technique};
 
-/// Scripts of random views.
-const SCRIPTS: u32 = 10_000;
+/// Number of random flights.
+const FLIGHTS: u32 = 10_000;
 
-/// Frames of a script.
+/// Frames per flight.
 const FRAMES: u32 = 7;
 
 struct Random(u64);
@@ -35,7 +36,7 @@ impl Random {
     }
 }
 
-/// Rough, smooth and a cliff; whole tiles and such that stick out.
+/// Returns rough, smooth and cliff fields, of whole tiles and of partial ones.
 fn fields() -> Vec<Arc<Field>> {
     let field = |size: [u32; 2], height: &dyn Fn(u32, u32) -> f32| {
         let heights = (0..size[0] * size[1]).map(|k| height(k % size[0], k / size[0])).collect();
@@ -48,7 +49,7 @@ fn fields() -> Vec<Arc<Field>> {
     vec![field([33, 33], &rough), field([41, 33], &smooth), field([33, 41], &cliff), field([30, 37], &rough)]
 }
 
-/// A view of a script: near or far, with any tolerance.
+/// Returns a random view, near or far, with any tolerance.
 fn view(field: &Field, random: &mut Random, time_s: f64) -> View {
     let [w, h] = field.size().map(f64::from);
     let at = |random: &mut Random| field.world_at(w * random.number(), h * random.number(), 80.0 * random.number());
@@ -65,12 +66,12 @@ fn view(field: &Field, random: &mut Random, time_s: f64) -> View {
     }
 }
 
-/// The next view: a step on, a turn back, a teleport, another tolerance, or the same once more.
+/// Returns the next view: a step, the view before, a teleport, another tolerance, or the same view.
 fn next(field: &Field, random: &mut Random, [before, last]: [&View; 2]) -> View {
     let dt = random.one_of(&[0.0, 1e-6, 0.1, 0.3, 10.0, 1e9, -5.0]);
     let time_s = last.time_s + dt;
-    let way = DVec3::new(random.number() - 0.5, random.number() - 0.5, random.number() - 0.5);
-    let step = View { eye: last.eye + way * random.one_of(&[1.0, 10.0]), time_s, ..*last };
+    let direction = DVec3::new(random.number() - 0.5, random.number() - 0.5, random.number() - 0.5);
+    let step = View { eye: last.eye + direction * random.one_of(&[1.0, 10.0]), time_s, ..*last };
     let other = random.one_of(&[0.5, 0.9, 1.1, 2.0]) * last.tolerance.px;
     match (random.number() * 6.0) as u32 {
         0 => View { time_s, ..*before },
@@ -81,28 +82,29 @@ fn next(field: &Field, random: &mut Random, [before, last]: [&View; 2]) -> View 
     }
 }
 
-/// What all scripts together came across.
+/// Counters over all flights.
 #[derive(Default)]
-struct Seen {
+struct Counters {
     frames: AtomicU64,
     morphing: AtomicU64,
     pending: AtomicU64,
     stitched: AtomicU64,
 }
 
-impl Seen {
+impl Counters {
     fn count(&self, list: &DrawList) {
         self.frames.fetch_add(1, Relaxed);
         let is_between = |weight: u32| weight > 0 && weight < ONE;
-        let morphing = list.instances.iter().any(|tile| is_between(get(tile, inside(0))));
+        let morphing = list.instances.iter().any(|tile| is_between(SlotWeights::of(tile).get(Slot::inside(0))));
         self.morphing.fetch_add(u64::from(morphing), Relaxed);
         self.pending.fetch_add(u64::from(list.pending > 0), Relaxed);
         self.stitched.fetch_add(u64::from(list.levels().iter().filter(|&&n| n > 0).count() > 1), Relaxed);
     }
 }
 
-/// Proves every frame of a flight, and measures all of them or those of every so many where nothing waits.
-fn check(flight: &str, field: &Field, technique: &mut dyn Technique, views: &[View], measures: bool, seen: &Seen) {
+/// Checks every frame of a flight for watertightness. With `measures`, also measures the error of frames in which
+/// nothing is pending.
+fn check(flight: &str, field: &Field, technique: &mut dyn Technique, views: &[View], measures: bool, seen: &Counters) {
     for (frame, view) in views.iter().enumerate() {
         let mut list = DrawList::default();
         technique.select(view, &mut list);
@@ -119,12 +121,12 @@ fn check(flight: &str, field: &Field, technique: &mut dyn Technique, views: &[Vi
 }
 
 #[test]
-fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
-    let (fields, seen) = (fields(), Seen::default());
-    (0..SCRIPTS).into_par_iter().for_each(|script| {
-        let random = &mut Random(u64::from(script) << 20 | 0x5eed);
+fn random_flights_are_watertight_and_within_the_tolerance() {
+    let (fields, seen) = (fields(), Counters::default());
+    (0..FLIGHTS).into_par_iter().for_each(|flight| {
+        let random = &mut Random(u64::from(flight) << 20 | 0x5eed);
         (0..5).for_each(|_| _ = random.number());
-        let field = &fields[script as usize % fields.len()];
+        let field = &fields[flight as usize % fields.len()];
         let clock = random.one_of(&["clock=speed", "clock=time", "clock=frames"]);
         let rebuild = random.one_of(&["rebuild=1", "rebuild=1", "rebuild=16", "rebuild=100000"]);
         let tile = random.one_of(&["tile=9", "tile=9", "tile=17"]);
@@ -134,26 +136,24 @@ fn every_frame_of_random_scripts_is_one_surface_within_the_tolerance() {
             let before = views[views.len().saturating_sub(2)];
             views.push(next(field, random, [&before, &views[views.len() - 1]]));
         }
-        check(&format!("script {script}"), field, &mut *technique, &views, script.is_multiple_of(4), &seen);
+        check(&format!("flight {flight}"), field, &mut *technique, &views, flight.is_multiple_of(4), &seen);
     });
     let [frames, morphing, pending, stitched] =
         [seen.frames, seen.morphing, seen.pending, seen.stitched].map(AtomicU64::into_inner);
-    println!(
-        "{frames} frames, {morphing} in mid-morph, {stitched} of several levels, {pending} with something waiting"
-    );
+    println!("{frames} frames, {morphing} morphing, {stitched} of several levels, {pending} with something pending");
     assert!(morphing > frames / 20 && pending > frames / 20 && stitched > frames / 20, "all of it occurs");
 }
 
 #[test]
-fn every_frame_of_every_path_is_one_surface_within_the_tolerance() {
+fn all_paths_are_watertight_and_within_the_tolerance() {
     let fields = [(synth::Kind::Fractal, [97, 81]), (synth::Kind::Eroded, [97, 97]), (synth::Kind::Cliff, [81, 90])];
     let fields = fields.map(|(kind, size)| Arc::new(synth::synth(kind, size, 3)));
     let clocks = ["clock=speed", "clock=time", "clock=frames"];
     let flights = fields.iter().flat_map(|field| paths::PATHS.iter().map(move |path| (field, path)));
     let flights: Vec<_> = flights.flat_map(|(field, path)| clocks.map(|clock| (field, path, clock))).collect();
-    let ways = [("rebuild=100000", "tile=9", 24, false), ("rebuild=1", "tile=17", 90, true)];
-    for (rebuild, tile, frames, waits) in ways {
-        let seen = Seen::default();
+    let cases = [("rebuild=100000", "tile=9", 24, false), ("rebuild=1", "tile=17", 90, true)];
+    for (rebuild, tile, frames, has_pending) in cases {
+        let seen = Counters::default();
         flights.par_iter().for_each(|(field, path, clock)| {
             let tolerance = Tolerance { px: 2.0, metric: Metric::Certified };
             let views = path.views(field, frames, [320, 200], tolerance);
@@ -161,21 +161,21 @@ fn every_frame_of_every_path_is_one_surface_within_the_tolerance() {
             check(&format!("{}, {clock}, {rebuild}", path.name), field, &mut *technique, &views, true, &seen);
         });
         let [frames, morphing, pending] = [&seen.frames, &seen.morphing, &seen.pending].map(|n| n.load(Relaxed));
-        println!("{rebuild}: {frames} frames, {morphing} in mid-morph, {pending} with something waiting");
-        assert!(morphing > frames / 20 && (pending > 0) == waits, "{rebuild}: {morphing}, {pending} of {frames}");
+        println!("{rebuild}: {frames} frames, {morphing} morphing, {pending} with something pending");
+        assert!(morphing > frames / 20 && (pending > 0) == has_pending, "{rebuild}: {morphing}, {pending} of {frames}");
     }
 }
 
 /// Corners: lattice position, and height as bits.
 type Triangle = [(i32, i32, u32); 3];
 
-/// The triangles of a view once the technique has settled in it, in any order, and how many frames that took.
+/// Returns the triangles of a view after the technique has settled, sorted, and the number of frames until then.
 fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Triangle>, u32) {
     for frame in 1..5000 {
         let mut list = DrawList::default();
         technique.select(&View { time_s: view.time_s + f64::from(frame), ..*view }, &mut list);
         if technique.is_settled() {
-            assert_eq!(list.pending, 0, "nothing waits any more");
+            assert_eq!(list.pending, 0, "nothing has_pending any more");
             let frame_data = Frame::placing(field, view);
             let drawn = expand::triangles(field, &frame_data, technique.resident(), &list);
             let mut triangles: Vec<Triangle> =
@@ -188,7 +188,7 @@ fn settled(field: &Field, technique: &mut dyn Technique, view: &View) -> (Vec<Tr
 }
 
 #[test]
-fn one_chunk_a_frame_comes_to_the_same_terrain_as_all_at_once() {
+fn rebuild_limit_does_not_change_the_settled_triangles() {
     let random = &mut Random(7);
     let mut longest = 0;
     for field in fields() {
@@ -203,10 +203,10 @@ fn one_chunk_a_frame_comes_to_the_same_terrain_as_all_at_once() {
             }
         }
     }
-    assert!(longest > 10, "something had to wait");
+    assert!(longest > 10, "something was pending");
 }
 
-/// The list of a view once the technique has settled in it.
+/// Returns the list of a view after the technique has settled.
 fn settled_list(technique: &mut dyn Technique, view: &View) -> DrawList {
     for frame in 1..5000 {
         let mut list = DrawList::default();
@@ -218,11 +218,11 @@ fn settled_list(technique: &mut dyn Technique, view: &View) -> DrawList {
     panic!("it never settles");
 }
 
-/// A view that the buffer cannot hold is drawn under a wider tolerance, which it keeps, and no tile waits for ever.
+/// A view that the buffer cannot hold is drawn under a greater tolerance, which is kept, and no tile stays pending.
 #[test]
-fn a_full_buffer_widens_the_tolerance() {
+fn full_buffer_scales_the_tolerance() {
     let field = Arc::new(synth::synth(synth::Kind::Eroded, [257, 257], 5));
-    let (random, mut frames, mut select_within_limits) = (&mut Random(11), 0, 0);
+    let (random, mut frames, mut scaled) = (&mut Random(11), 0, 0);
     for settings in [
         ["morph=on", "clock=speed"],
         ["morph=on", "clock=time"],
@@ -240,30 +240,29 @@ fn a_full_buffer_widens_the_tolerance() {
             let max_px = geometric::errors(&field, &view, technique.resident(), &list).screen_px.max;
             let px = view.tolerance.px * list.tolerance_scale;
             assert!(max_px <= px * (1.0 + 1e-9), "{settings:?}, view {k}: {max_px} px of {px}");
-            (frames, select_within_limits) =
-                (frames + 1, select_within_limits + usize::from(list.tolerance_scale > 1.0));
+            (frames, scaled) = (frames + 1, scaled + usize::from(list.tolerance_scale > 1.0));
         }
     }
-    println!("{select_within_limits} of {frames} views under a wider tolerance");
-    assert!(select_within_limits > frames / 20 && select_within_limits < frames - frames / 20);
+    println!("{scaled} of {frames} views under a greater tolerance");
+    assert!(scaled > frames / 20 && scaled < frames - frames / 20);
 }
 
-/// Frames of a way along which tiles only coarsen: the bound never hurries them.
+/// Frames of a flight in which tiles only coarsen, so that the error bound never speeds them up.
 const COARSENING: u32 = 250;
 
-/// The furthest that the surface moved from one frame to the next over any sample, as a part of the field's range of
-/// heights, beyond what the clock says; and how far it moved at most. The clock's part counts twice, as a vertex goes
-/// with the inside and with a side, and so do the steps of weights.
-fn beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -> [f64; 2] {
+/// Returns the largest movement of the surface in one frame at any sample, minus the movement that the clock allows, as
+/// a part of the field's height range; and the largest movement itself. The clock's part counts twice, because a vertex
+/// may move with the inside and with a side, and so do the steps of weights.
+fn movement_beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -> [f64; 2] {
     let range = field.statistics();
     let range_m = f64::from(range.max - range.min);
     let centre = field.world_at(20.0, 18.0, 10.0);
     let away = DVec3::new(0.6, 0.5, 0.62);
     let (mut last, mut found, mut time_s) = (Vec::new(), [f64::MIN, 0.0], 0.0);
     for k in 0..COARSENING {
-        // By speed the viewer goes away; else the tolerance leaps, and nothing but the clock goes on.
-        let [way_m, px] = if drive == "speed" { [f64::from(k), 8.0] } else { [0.0, if k == 0 { 0.3 } else { 40.0 }] };
-        let eye = centre + away * (150.0 + way_m);
+        // With `clock=speed` the viewer recedes. Otherwise the tolerance jumps once, and only the clock advances.
+        let [moved_m, px] = if drive == "speed" { [f64::from(k), 8.0] } else { [0.0, if k == 0 { 0.3 } else { 40.0 }] };
+        let eye = centre + away * (150.0 + moved_m);
         let dt_s = [0.0, 0.01, 0.03][k as usize % 3];
         time_s += dt_s;
         let view = View {
@@ -277,7 +276,7 @@ fn beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -
         };
         let mut list = DrawList::default();
         technique.select(&view, &mut list);
-        // What waits for its first chunk moves as soon as that is there.
+        // Tiles pending on their first chunk move as soon as it arrives.
         while k == 0 && !technique.is_settled() {
             list.clear();
             time_s += 1.0;
@@ -300,21 +299,21 @@ fn beyond_the_clock(field: &Field, technique: &mut dyn Technique, drive: &str) -
 }
 
 #[test]
-fn nothing_moves_further_in_a_frame_than_the_clock_says() {
+fn movement_per_frame_is_limited_by_the_clock() {
     for drive in ["speed", "time", "frames"] {
-        let (clock, mut max, mut leap) = (format!("clock={drive}"), 0.0f64, f64::MIN);
-        // Tiles that stick out of a field do not morph inside: the last one has some.
+        let (clock, mut max, mut jump) = (format!("clock={drive}"), 0.0f64, f64::MIN);
+        // Partial tiles do not morph inside; the last field has some.
         for field in &fields()[..3] {
             for rebuild in ["rebuild=1", "rebuild=100000"] {
                 let mut morphing = technique(field, "smooth-tiles", &["tile=9", &clock, rebuild]);
-                let [beyond, moved] = beyond_the_clock(field, &mut *morphing, drive);
+                let [beyond, moved] = movement_beyond_the_clock(field, &mut *morphing, drive);
                 assert!(beyond <= 0.0, "{drive}, {rebuild}: {beyond} of the range beyond the clock");
                 max = max.max(moved);
             }
             let mut at_once = technique(field, "smooth-tiles", &["tile=9", "morph=off"]);
-            leap = leap.max(beyond_the_clock(field, &mut *at_once, drive)[0]);
+            jump = jump.max(movement_beyond_the_clock(field, &mut *at_once, drive)[0]);
         }
-        println!("{drive}: {max:.4} of the range in a frame at most; at once {leap:.4} beyond the clock");
-        assert!(max > 0.005 && leap > 0.05, "{drive}: it moves, and at once it leaps: {max}, {leap}");
+        println!("{drive}: {max:.4} of the range in a frame at most; at once {jump:.4} beyond the clock");
+        assert!(max > 0.005 && jump > 0.05, "{drive}: it moves, and at once it jumps: {max}, {jump}");
     }
 }

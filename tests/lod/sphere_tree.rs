@@ -1,4 +1,4 @@
-//! Spheres: the same triangles however crossings are found, whatever the way there.
+//! Sphere tree: all criteria draw the same triangles, independent of the path to a view.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
 use cuesta::lod::sphere_tree::covers::Covers;
 use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
 use cuesta::lod::sphere_tree::lattice::Place;
-use cuesta::lod::sphere_tree::measure::{Known, Measured};
+use cuesta::lod::sphere_tree::measure::{DiamondInfo, Measured};
 use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::lod::sphere_tree::roam::Queues;
 use cuesta::lod::sphere_tree::splits::{Found, Splits};
@@ -22,13 +22,13 @@ use glam::DVec3;
 struct Dice(u64);
 
 impl Dice {
-    /// 0..1.
+    /// Returns a number in 0..1.
     fn share(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Anywhere in a cube about 0 of side 2.
+    /// Returns a point in a cube about 0 of side 2.
     fn direction(&mut self) -> DVec3 {
         DVec3::new(self.share(), self.share(), self.share()) * 2.0 - 1.0
     }
@@ -40,14 +40,14 @@ fn terrain(size: [u32; 2]) -> Arc<Field> {
     Arc::new(field)
 }
 
-/// No two neighbours alike.
+/// Returns a field without correlation of neighbouring samples.
 fn noise(size: [u32; 2]) -> Arc<Field> {
     let mut dice = Dice(9);
     let heights = (0..size[0] * size[1]).map(|_| 50.0 * dice.share() as f32).collect();
     Arc::new(Field::new(Samples::F32(heights), size, [3.0, 3.0], Holes::none((size[0] * size[1]) as usize)))
 }
 
-/// Smooth land over 1280 m, of a size that nothing sticks out of.
+/// Returns smooth terrain over 1280 m, of a size without partial diamonds.
 fn hills() -> Arc<Field> {
     let height = |x: f32, z: f32| 40.0 * (x / 9.0).sin() + 30.0 * (z / 7.0).cos() + 2.0 * (1.3 * x + z).sin();
     let heights = (0..129 * 129).map(|k| height((k % 129) as f32, (k / 129) as f32)).collect();
@@ -70,18 +70,18 @@ fn viewpoint(measured: &Measured, eye: DVec3, px: f64) -> Viewpoint {
     Viewpoint { eye: measured.relative(eye), reach: Reach::new(&view(eye, px)), band: 1.0, hold: 1.0 }
 }
 
-/// Every diamond.
-fn diamonds(measured: &Measured) -> Vec<Known> {
+/// Returns all diamonds.
+fn diamonds(measured: &Measured) -> Vec<DiamondInfo> {
     let of_level = |level: u32| {
         let [x_count, z_count] = measured.lattice.count(level);
         let places = (0..z_count).flat_map(move |j| (0..x_count).map(move |i| (i, j)));
         places.filter(|(i, j)| (i | j) & 1 == 1).map(move |(i, j)| [i << level, j << level])
     };
-    let known = |at: Place| measured.known(at, measured.lattice.index(at).expect("a diamond"));
-    (0..measured.lattice.levels()).flat_map(of_level).map(known).collect()
+    let diamond = |at: Place| measured.diamond(at, measured.lattice.index(at).expect("a diamond"));
+    (0..measured.lattice.levels()).flat_map(of_level).map(diamond).collect()
 }
 
-/// Walks at all speeds with leaps, now and then under another tolerance.
+/// Returns a path at various speeds with teleports and changes of the tolerance.
 fn walk(field: &Field, steps: usize, seed: u64) -> Vec<(DVec3, f64)> {
     let mut dice = Dice(seed);
     let [w, h] = field.size().map(f64::from);
@@ -102,9 +102,9 @@ fn walk(field: &Field, steps: usize, seed: u64) -> Vec<(DVec3, f64)> {
     walk
 }
 
-/// The set is what it is defined to be: by every sphere alone, without looking at the others.
+/// Compares the set with its definition: each sphere checked on its own.
 #[test]
-fn what_has_split_are_the_spheres_around_the_eye() {
+fn split_diamonds_are_those_whose_spheres_contain_the_eye() {
     for field in [terrain([100, 140]), noise([40, 33])] {
         let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
         let (all, mut found) = (diamonds(&measured), Found::default());
@@ -112,9 +112,9 @@ fn what_has_split_are_the_spheres_around_the_eye() {
         for (eye, px) in walk(&field, 60, 4) {
             let from = viewpoint(&measured, eye, px);
             assert!(splits.refill(&measured, &from, &mut found, usize::MAX));
-            for known in &all {
-                let is_inside = known.centre.distance(from.eye) < from.reach.radius(known);
-                assert_eq!(splits.contains(known.index), is_inside, "{known:?}");
+            for diamond in &all {
+                let is_inside = diamond.centre.distance(from.eye) < from.reach.radius(diamond);
+                assert_eq!(splits.contains(diamond.index), is_inside, "{diamond:?}");
             }
             (min, max) = (min.min(splits.count()), max.max(splits.count()));
         }
@@ -136,32 +136,32 @@ fn follows<W: CrossingTracker>(field: &Arc<Field>, band: f64, hold: f64, seed: u
         assert_eq!(follower.splits().count(), splits.count(), "step {step}");
         saved += usize::from(follower.visited() * 2 < found.visited);
     }
-    assert!(saved > 300, "looked at less in {saved} steps only");
+    assert!(saved > 300, "checked fewer in {saved} steps only");
 }
 
 #[test]
-fn made_up_spheres_find_the_same_as_all() {
+fn bounding_spheres_find_all_crossings() {
     follows::<BoundingSpheres>(&terrain([100, 140]), 1.0, 1.0, 1);
     follows::<BoundingSpheres>(&noise([70, 33]), 1.3, 1.0, 2);
     follows::<BoundingSpheres>(&terrain([129, 129]), 1.0, 1.1, 3);
 }
 
 #[test]
-fn spheres_that_cover_others_find_the_same_as_all() {
+fn nested_spheres_find_all_crossings() {
     follows::<Covers>(&terrain([100, 140]), 1.0, 1.0, 1);
     follows::<Covers>(&noise([70, 33]), 1.3, 1.0, 2);
     follows::<Covers>(&terrain([129, 129]), 1.0, 1.1, 3);
 }
 
 #[test]
-fn two_queues_find_the_same_as_all() {
+fn roam_queues_find_all_crossings() {
     follows::<Queues>(&terrain([100, 140]), 1.0, 1.0, 5);
     follows::<Queues>(&noise([70, 33]), 1.3, 1.0, 6);
     follows::<Queues>(&terrain([129, 129]), 1.0, 1.1, 7);
 }
 
 #[test]
-fn a_follower_gives_up_beyond_its_limit_and_recovers() {
+fn follower_stops_at_its_limit_and_recovers() {
     let field = terrain([100, 140]);
     let measured = Measured::new(Arc::clone(&field), 1.0, &Progress::default());
     let (mut follower, mut found) = (Follower::<BoundingSpheres>::new(&measured), Found::default());
@@ -181,21 +181,21 @@ fn a_follower_gives_up_beyond_its_limit_and_recovers() {
         assert!(!follows || follower.splits().count() == count);
         gave_up += usize::from(!follows);
     }
-    assert!(gave_up > 20, "gave up {gave_up} times");
+    assert!(gave_up > 20, "stopped {gave_up} times");
 }
 
-/// Walks a scene once with each criterion: the same lists, to the byte.
+/// Compares the lists of all criteria along a path, byte by byte.
 #[test]
-fn the_criteria_draw_the_same() {
+fn all_criteria_draw_the_same() {
     let field = terrain([150, 111]);
     for morph in ["morph=off", "morph=on"] {
         let criteria = ["criterion=spheres", "criterion=covers", "criterion=roam", "criterion=plain"];
-        let mut rooms = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion, morph]));
+        let mut techniques = criteria.map(|criterion| super::technique(&field, "sphere-tree", &[criterion, morph]));
         let mut triangles = 0;
         for (eye, px) in walk(&field, 200, 11) {
-            let lists = rooms.each_mut().map(|room| {
+            let lists = techniques.each_mut().map(|technique| {
                 let mut list = DrawList::default();
-                room.select(&view(eye, px), &mut list);
+                technique.select(&view(eye, px), &mut list);
                 (list.draws, list.streamed.indices, bytemuck::cast_slice::<_, u8>(&list.streamed.vertices).to_vec())
             });
             assert!(lists.iter().all(|list| *list == lists[0]), "at {eye}");
@@ -205,16 +205,16 @@ fn the_criteria_draw_the_same() {
     }
 }
 
-/// The most that a drawn height above a sample changes from one step of a flight to the next, metres a metre, and how
-/// often wedges split or merge there.
+/// Returns the largest change of a drawn height at a sample between steps of a flight, in metres per metre, and how
+/// often wedges split or merged.
 fn change(field: &Arc<Field>, settings: &[&str]) -> (f64, usize) {
-    let mut room = super::technique(field, "sphere-tree", settings);
+    let mut technique = super::technique(field, "sphere-tree", settings);
     let (mut last, mut largest, mut switches) = (None::<(Vec<f64>, u64)>, 0.0f64, 0);
     for step in 0..150 {
         let at = DVec3::new(400.0, 120.0, 300.0) + DVec3::new(0.6, 0.0, 0.8) * f64::from(step) * STEP_M;
         let (view, mut list) = (view(at, 10.0), DrawList::default());
-        room.select(&view, &mut list);
-        let heights = super::heights(field, &view, room.resident(), &list);
+        technique.select(&view, &mut list);
+        let heights = super::heights(field, &view, technique.resident(), &list);
         if let Some((before, triangles)) = &last {
             let changes = heights.iter().zip(before).map(|(a, b)| (a - b).abs()).filter(|change| change.is_finite());
             largest = largest.max(changes.fold(0.0, f64::max) / STEP_M);
@@ -229,7 +229,7 @@ fn change(field: &Arc<Field>, settings: &[&str]) -> (f64, usize) {
 const STEP_M: f64 = 0.5;
 
 #[test]
-fn nothing_pops_where_vertices_fade_in() {
+fn fading_vertices_do_not_pop() {
     let field = hills();
     let (pop, switches) = change(&field, &["morph=off"]);
     let (fade, fading_switches) = change(&field, &["morph=on"]);
@@ -238,15 +238,15 @@ fn nothing_pops_where_vertices_fade_in() {
     assert!(pop > 100.0 * fade, "{pop} m a metre without fading, {fade} with it");
 }
 
-/// A wedge that has just split stays so until the eye is a little further away.
+/// With `hold=on`, a wedge that has just split stays split until the eye is slightly further away.
 #[test]
-fn what_is_held_does_not_switch_to_and_fro() {
+fn hold_prevents_oscillation() {
     let field = hills();
     let switches = |hold: &str| {
-        let mut room = super::technique(&field, "sphere-tree", &[hold]);
+        let mut technique = super::technique(&field, "sphere-tree", &[hold]);
         let counts = (0..40).map(|step| {
             let mut list = DrawList::default();
-            room.select(&view(DVec3::new(500.0 + 3.0 * f64::from(step % 2), 120.0, 600.0), 10.0), &mut list);
+            technique.select(&view(DVec3::new(500.0 + 3.0 * f64::from(step % 2), 120.0, 600.0), 10.0), &mut list);
             list.triangles()
         });
         let counts: Vec<_> = counts.collect();
@@ -256,7 +256,7 @@ fn what_is_held_does_not_switch_to_and_fro() {
     assert!(switches("hold=on") <= 1);
 }
 
-/// Overwrites what a device has as it would.
+/// Applies uploads as the device would.
 fn apply(uploads: &[Upload], device: &mut Geometry) {
     for upload in uploads {
         match upload {
@@ -267,7 +267,7 @@ fn apply(uploads: &[Upload], device: &mut Geometry) {
     }
 }
 
-/// The triangles that a device draws which has had all uploads so far; they, and the bytes sent for them.
+/// Returns the triangles that a device draws after all uploads so far, and the bytes sent for them.
 fn drawn_on(device: &mut Geometry, field: &Field, view: &View, list: &DrawList) -> (Vec<[[i64; 3]; 3]>, usize) {
     apply(&list.uploads, device);
     let triangles = expand::triangles(field, &Frame::placing(field, view), device, list);
@@ -278,20 +278,20 @@ fn drawn_on(device: &mut Geometry, field: &Field, view: &View, list: &DrawList) 
     (corners, size.upload_bytes + size.vertices * size_of::<ExplicitVertex>() + size.indices * 4)
 }
 
-/// Patches on the device, sent when they change: at every step of a walk the triangles that are streamed otherwise.
+/// Compares resident patches with streamed triangles at every step of a path.
 #[test]
-fn patches_draw_what_is_streamed_otherwise() {
+fn resident_patches_match_streamed_triangles() {
     let field = terrain([300, 260]);
     for (morph, min_saving) in [("morph=off", 3.0), ("morph=on", 0.9)] {
-        let mut rooms = ["patches=streamed", "patches=resident"]
+        let mut techniques = ["patches=streamed", "patches=resident"]
             .map(|patches| super::technique(&field, "sphere-tree", &[morph, patches]));
-        let mut devices = rooms.each_ref().map(|room| room.resident().clone());
+        let mut devices = techniques.each_ref().map(|technique| technique.resident().clone());
         let (mut sent, mut resident_draws) = ([0; 2], 0);
         for (eye, px) in walk(&field, 300, 17) {
             let view = view(eye, px);
             let drawn = [0, 1].map(|k| {
                 let mut list = DrawList::default();
-                rooms[k].select(&view, &mut list);
+                techniques[k].select(&view, &mut list);
                 let (triangles, bytes) = drawn_on(&mut devices[k], &field, &view, &list);
                 sent[k] += bytes;
                 resident_draws += list.draws.iter().filter(|draw| draw.source == Source::Resident).count();

@@ -1,4 +1,4 @@
-//! Sorted strips: one surface whatever the level function, and triangles in the order of sight.
+//! Sorted strips: watertight for any level function, with triangles in front-to-back order.
 
 use cuesta::draw::expand::Drawn;
 use cuesta::height::surface::Corner;
@@ -17,13 +17,13 @@ use rayon::prelude::*;
 struct Dice(u64);
 
 impl Dice {
-    /// 0..1.
+    /// Returns a number in 0..1.
     fn share(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// 0..n.
+    /// Returns a number in 0..n.
     fn below(&mut self, n: i32) -> i32 {
         (self.share() * f64::from(n)) as i32
     }
@@ -33,7 +33,7 @@ impl Dice {
     }
 }
 
-/// A field, pages of it and a level function, all at random, and where it is looked at from.
+/// A random field with pages, a level function and a viewpoint.
 struct Scene {
     field: Field,
     pages: Pages,
@@ -46,7 +46,7 @@ impl Scene {
         let mut dice = Dice(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let (mut size, level) = ([0; 2].map(|_| 2 + dice.below(120) as u32), 1 + dice.below(6) as u32);
         if !closed {
-            // Nothing sticks out.
+            // Sizes without partial pages.
             size = size.map(|n| n.next_multiple_of(1 << level) + 1);
         }
         let heights = (0..size[0] * size[1]).map(|_| dice.share() as f32).collect();
@@ -74,7 +74,7 @@ impl Scene {
 
     fn triangles(&self) -> Vec<Drawn> {
         let shapes = Shapes::default();
-        let ground = WalkContext {
+        let context = WalkContext {
             field: &self.field,
             pages: &self.pages,
             levels: &self.splits,
@@ -82,12 +82,12 @@ impl Scene {
             traversal: self.traversal,
             blend: Blend::Off,
         };
-        let streams = self.pages.rows(&self.traversal).into_iter().map(|row| ground.walk(&row));
+        let streams = self.pages.rows(&self.traversal).into_iter().map(|row| context.walk(&row));
         streams
             .flat_map(|stream| {
                 let corner = |k: u32| match stream.vertices.get(k as usize) {
                     Some(vertex) => Corner { x: vertex.position[0], z: vertex.position[1], y: vertex.height },
-                    // A vertex that should be there and is not.
+                    // A missing vertex gets an invalid position.
                     None => Corner { x: -1, z: -1, y: 0.0 },
                 };
                 let triangle = |t: &[u32]| Drawn { corners: [corner(t[0]), corner(t[1]), corner(t[2])], instance: 0 };
@@ -96,7 +96,7 @@ impl Scene {
             .collect()
     }
 
-    /// Twice the area of the pages drawn, samples².
+    /// Returns twice the area of the drawn pages, samples².
     fn doubled_area(&self) -> i64 {
         let Grid { last, .. } = self.pages.grid;
         let side = self.pages.grid.side();
@@ -105,8 +105,8 @@ impl Scene {
     }
 }
 
-/// A view of nothing.
-fn nothing() -> View {
+/// Returns a view in which nothing is visible.
+fn empty_view() -> View {
     View {
         eye: DVec3::new(1e7, 0.0, 0.0),
         world_from_eye: View::turned(0.0, 0.0, 0.0),
@@ -119,8 +119,8 @@ fn nothing() -> View {
 }
 
 #[test]
-fn ten_thousand_level_functions_give_one_surface_each() {
-    let frustum = nothing().frustum();
+fn random_level_functions_are_watertight() {
+    let frustum = empty_view().frustum();
     let proofs: Vec<_> = (0..12_000u64)
         .into_par_iter()
         .map(|seed| {
@@ -137,11 +137,11 @@ fn ten_thousand_level_functions_give_one_surface_each() {
     assert!(levels.iter().filter(|&&levels| levels > 2).count() > 3000, "most have several levels");
 }
 
-/// The published condition is needed: level functions that break it often give no surface.
+/// The published condition is necessary: level functions that violate it often give gaps.
 #[test]
-fn level_functions_that_are_not_closed_are_refuted() {
-    let frustum = nothing().frustum();
-    let (mut open_ones, mut refuted) = (0, 0);
+fn unclosed_level_functions_are_detected() {
+    let frustum = empty_view().frustum();
+    let (mut open_ones, mut detected) = (0, 0);
     for seed in 0..400u64 {
         let [open, closed] = [false, true].map(|closed| Scene::random(seed, closed));
         let proof = watertight::prove(&open.field, &frustum, &open.triangles());
@@ -149,10 +149,10 @@ fn level_functions_that_are_not_closed_are_refuted() {
         let closed = open.splits.count() == closed.splits.count();
         assert!(!closed || is_whole, "seed {seed}: closed, and no surface");
         open_ones += u32::from(!closed);
-        refuted += u32::from(!closed && !is_whole);
+        detected += u32::from(!closed && !is_whole);
     }
-    println!("{refuted} of {open_ones} refuted");
-    assert!(refuted > 50 && refuted * 10 > open_ones * 3, "{refuted} of {open_ones}");
+    println!("{detected} of {open_ones} detected");
+    assert!(detected > 50 && detected * 10 > open_ones * 3, "{detected} of {open_ones}");
 }
 
 fn is_any_split(scene: &Scene, level: u32) -> bool {
@@ -161,26 +161,26 @@ fn is_any_split(scene: &Scene, level: u32) -> bool {
     (0..count[1]).any(|z| (0..count[0]).any(|x| scene.splits.is_split(level, [x, z])))
 }
 
-/// In plan: rays from the eye, of all directions that its view is said to have, meet triangles in the order in which
-/// they come. From another eye they do not.
+/// Checks in plan that rays from the eye, in all of its view's directions, meet triangles in the order of the stream.
+/// From another eye they do not.
 #[test]
 fn rays_meet_triangles_in_order() {
     let rays = |seed: u64| {
         let mut scene = Scene::random(seed, true);
         let traversal = scene.traversal;
-        let [met, unsorted] = follow(seed, &scene.triangles(), &traversal);
+        let [meetings, unsorted] = follow(seed, &scene.triangles(), &traversal);
         assert_eq!(unsorted, 0, "seed {seed}, {:?}, {traversal:?}", scene.pages.grid);
         scene.traversal =
             TraversalDirection { eye: [0, 1].map(|k| 500.0 * f64::from(traversal.ahead[k])), ..traversal };
-        [met, follow(seed, &scene.triangles(), &traversal)[1]]
+        [meetings, follow(seed, &scene.triangles(), &traversal)[1]]
     };
-    let met: Vec<_> = (0..600u64).into_par_iter().map(rays).collect();
-    let [met, control] = [0, 1].map(|k| met.iter().map(|met| met[k]).sum::<usize>());
-    println!("{met} triangles met, {control} rays unsorted from another eye");
-    assert!(met > 10_000 && control > 1000);
+    let meetings: Vec<_> = (0..600u64).into_par_iter().map(rays).collect();
+    let [meetings, control] = [0, 1].map(|k| meetings.iter().map(|meetings| meetings[k]).sum::<usize>());
+    println!("{meetings} triangles met, {control} rays unsorted from another eye");
+    assert!(meetings > 10_000 && control > 1000);
 }
 
-/// Triangles that rays meet, and rays that do not meet them in order.
+/// Returns the number of triangles that rays meet, and the number of rays that meet them out of order.
 fn follow(seed: u64, triangles: &[Drawn], traversal: &TraversalDirection) -> [usize; 2] {
     let mut dice = Dice(seed);
     let mut sums = [0; 2];
@@ -188,21 +188,22 @@ fn follow(seed: u64, triangles: &[Drawn], traversal: &TraversalDirection) -> [us
         let min = traversal.against.map(|against| if against { -1.0 } else { 0.0 });
         let towards = [0, 1].map(|k| f64::from(traversal.ahead[k]) * (min[k] + (1.0 - min[k]) * dice.share()));
         let in_ray = |(k, t): (usize, &Drawn)| Some((middle_inside(t, traversal.eye, towards)?, k));
-        let mut met: Vec<(f64, usize)> = triangles.iter().enumerate().filter_map(in_ray).collect();
-        met.sort_by(|a, b| a.0.total_cmp(&b.0));
-        sums[0] += met.len();
-        sums[1] += usize::from(!met.is_sorted_by_key(|m| m.1));
+        let mut meetings: Vec<(f64, usize)> = triangles.iter().enumerate().filter_map(in_ray).collect();
+        meetings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sums[0] += meetings.len();
+        sums[1] += usize::from(!meetings.is_sorted_by_key(|m| m.1));
     }
     sums
 }
 
-/// How far along a ray the middle of its part in a triangle is, if it has such a part in front of the eye.
+/// Returns the distance along a ray to the middle of its part inside a triangle; `None` without such a part in front of
+/// the eye.
 fn middle_inside(triangle: &Drawn, eye: [f64; 2], towards: [f64; 2]) -> Option<f64> {
     let (mut first, mut last) = (0.0f64, f64::INFINITY);
     for k in 0..3 {
         let [p, q] = [triangle.corners[k], triangle.corners[(k + 1) % 3]].map(|c| [f64::from(c.x), f64::from(c.z)]);
         let side = [q[0] - p[0], q[1] - p[1]];
-        // Inside: not to the left, seen from above with z south.
+        // Inside means not to the left, seen from above with z to the south.
         let value = side[1] * (eye[0] - p[0]) - side[0] * (eye[1] - p[1]);
         let slope = side[1] * towards[0] - side[0] * towards[1];
         let at = -value / slope;
@@ -217,7 +218,8 @@ fn middle_inside(triangle: &Drawn, eye: [f64; 2], towards: [f64; 2]) -> Option<f
     (last - first > 1e-9).then_some((first + last) / 2.0)
 }
 
-/// Land of whole pages: what sticks out does not blend.
+/// Returns the drawn heights for each step of the eye. The field has whole pages, because vertices beyond the field do
+/// not morph.
 fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32) -> Vec<Vec<f64>> {
     let mut strips = super::technique(field, "sorted-strips", settings);
     let step = |k: u32| {
@@ -228,7 +230,7 @@ fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32)
             world_from_eye: View::turned(90.0, -30.0, 0.0),
             lens: Lens::Perspective { fov_x: 2.0 },
             size: [320, 200],
-            ..nothing()
+            ..empty_view()
         };
         let mut list = cuesta::draw::DrawList::default();
         strips.select(&view, &mut list);
@@ -238,7 +240,7 @@ fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32)
     (0..steps).map(step).collect()
 }
 
-/// The largest change of height from one step of the eye to the next, and from the first to the last, metres.
+/// Returns the largest change of height between steps, and between the first and the last step, metres.
 fn changes(heights: &[Vec<f64>]) -> [f64; 2] {
     let change =
         |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).filter(|d| !d.is_nan()).fold(0.0, f64::max);
@@ -247,7 +249,7 @@ fn changes(heights: &[Vec<f64>]) -> [f64; 2] {
 }
 
 #[test]
-fn blending_leaves_no_jumps() {
+fn morphing_strips_do_not_jump() {
     let mut field = cuesta::height::synth::synth(cuesta::height::synth::Kind::Fractal, [129, 129], 5);
     field.spacing = [20.0, 20.0];
     let field = std::sync::Arc::new(field);
@@ -255,16 +257,16 @@ fn blending_leaves_no_jumps() {
         let of = |blend: &str| changes(&blended_heights(&field, &["level=uniform", "edge=20", page, blend], 400));
         let [jump, _] = of("blend=off");
         for blend in ["blend=height", "blend=end"] {
-            let [step, way] = of(blend);
-            println!("{page} {blend}: jumps of {jump} m, blended {step} m a step and {way} m in all");
-            assert!(jump > 1.0 && step < 0.05 * jump && way > 0.1 * jump, "{page} {blend}: {jump} {step} {way}");
+            let [step, total] = of(blend);
+            println!("{page} {blend}: jumps of {jump} m, blended {step} m a step and {total} m in all");
+            assert!(jump > 1.0 && step < 0.05 * jump && total > 0.1 * jump, "{page} {blend}: {jump} {step} {total}");
         }
     }
 }
 
-/// Vertices that slide are on the edge of the next level on which they lie, and its ends stand.
+/// Checks that sliding vertices lie on the edge of the next level that contains them, and that its ends do not move.
 #[test]
-fn what_slides_does_so_along_an_edge_between_vertices_that_stand() {
+fn sliding_vertices_stay_on_edges_of_the_next_level() {
     let mut field = cuesta::height::synth::synth(cuesta::height::synth::Kind::Fractal, [257, 200], 5);
     field.spacing = [20.0, 30.0];
     let field = std::sync::Arc::new(field);
@@ -280,7 +282,7 @@ fn what_slides_does_so_along_an_edge_between_vertices_that_stand() {
                 world_from_eye: View::turned(360.0 * dice.share(), -60.0 * dice.share(), 0.0),
                 lens: Lens::Perspective { fov_x: 1.5 },
                 size: [640, 400],
-                ..nothing()
+                ..empty_view()
             };
             let mut list = cuesta::draw::DrawList::default();
             strips.select(&view, &mut list);
@@ -295,12 +297,12 @@ fn what_slides_does_so_along_an_edge_between_vertices_that_stand() {
                 let [x, z] = at(vertex);
                 sliding += 1;
                 arrived += usize::from(vertex.morph > 0.98);
-                // Back from the weight to where it stands, for each level that it may be of: one fits.
+                // Reconstructs the unmorphed position from the weight, for each possible level; one must match.
                 let fits = (0..6).any(|level| {
                     let step = f64::from(1 << level);
-                    [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]].iter().any(|way| {
-                        let home = [0, 1].map(|k| [x, z][k] + way[k] * step * f64::from(vertex.morph));
-                        let end = [0, 1].map(|k| ((home[k] - way[k] * step) * f64::from(unit)) as i32);
+                    [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]].iter().any(|direction| {
+                        let home = [0, 1].map(|k| [x, z][k] + direction[k] * step * f64::from(vertex.morph));
+                        let end = [0, 1].map(|k| ((home[k] - direction[k] * step) * f64::from(unit)) as i32);
                         home.iter().all(|n| n.fract() == 0.0)
                             && still.contains(&end)
                             && home.iter().all(|n| *n >= 0.0)

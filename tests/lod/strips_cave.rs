@@ -1,4 +1,4 @@
-//! Sorted strips over a floor and a ceiling: closed, in the order of sight, and within the tolerance.
+//! Sorted strips over a floor and a ceiling: watertight, in front-to-back order, and within the tolerance.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use super::strips_order::{SIZE, follow};
 
 const SPACING: [f64; 2] = [2.0, 3.0];
 
-/// Smooth passages between rough pillars, and some rock of one sample.
+/// Returns a cave of smooth passages between rough pillars, with some rock of one sample.
 fn cave(size: [u32; 2], seed: u64) -> Cave {
     let wave = |i: u32, j: u32, k: u64| {
         let phase = seed as f64 * 0.7 + k as f64 * 2.1;
@@ -56,7 +56,7 @@ fn drawn(cave: &Cave, strips: &mut CaveStrips, view: &View) -> Vec<Drawn> {
     expand::triangles(cave.floor(), &Frame::placing(cave.floor(), view), strips.resident(), &list)
 }
 
-/// A view from inside the cave if there is a place at that share of it, else from above or beneath.
+/// Returns a view from inside the cave if it has space there, otherwise from above or below.
 fn view(cave: &Cave, k: u64) -> View {
     let share =
         |n: u64| (k.wrapping_mul(6 * n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / (1u64 << 24) as f64;
@@ -75,7 +75,7 @@ fn view(cave: &Cave, k: u64) -> View {
     View { eye, world_from_eye, lens, size: SIZE, near: 0.05, tolerance, time_s: 0.0 }
 }
 
-/// A view of everything from above, at a tolerance.
+/// Returns a view of the whole cave from above, at a tolerance.
 fn whole(cave: &Cave, px: f64) -> View {
     let [w, h] = cave.floor().size().map(f64::from);
     let eye = cave.floor().world_at(w / 2.0, h / 2.0, 0.0) + DVec3::Y * 5000.0;
@@ -97,9 +97,9 @@ fn proven(cave: &Cave, strips: &mut CaveStrips, view: &View) -> CaveProof {
     prove_cave(cave.floor(), &view.frustum(), &triangles).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// Over views of all kinds; most see where floor and ceiling meet.
+/// Most of these views include places where floor and ceiling meet.
 #[test]
-fn floor_and_ceiling_close_the_cave() {
+fn caves_are_watertight() {
     let proofs = (0..40u64).into_par_iter().map(|seed| {
         let size = [[90, 71], [129, 65], [33, 97], [64, 64], [2, 50]][seed as usize % 5];
         let cave = Arc::new(cave(size, seed));
@@ -113,9 +113,9 @@ fn floor_and_ceiling_close_the_cave() {
     assert!(proofs.iter().filter(|proof| proof.seam_edges > 10).count() > proofs.len() / 2);
 }
 
-/// At no tolerance every triangle of the samples that is not all rock is there.
+/// At a tolerance of almost 0, every triangle of the samples that is not all rock is drawn.
 #[test]
-fn nothing_of_a_cave_is_left_out() {
+fn full_resolution_caves_are_complete() {
     for seed in 0..6 {
         let cave = Arc::new(cave([70, 45], seed));
         let is_rock = |at: &[i32; 2]| cave.is_rock(at[0] as u32, at[1] as u32);
@@ -133,7 +133,8 @@ fn nothing_of_a_cave_is_left_out() {
     }
 }
 
-/// Beyond a corner of the cave, looking into it from above, beneath and between; every other one of parallel rays.
+/// Returns a view from beyond a corner of the cave into it, from above, below or between; every other one is
+/// orthographic.
 fn from_outside(cave: &Cave, k: u64) -> View {
     let [w, h] = cave.floor().size().map(|n| f64::from(n - 1));
     let middle = cave.floor().world_at(w / 2.0, h / 2.0, 2.0);
@@ -149,7 +150,8 @@ fn from_outside(cave: &Cave, k: u64) -> View {
     View { eye, world_from_eye, lens, size: SIZE, near: 0.05, tolerance, time_s: 0.0 }
 }
 
-/// What rays of views meet, in both orders; those that meet triangles out of order.
+/// Returns the number of rays of all views that meet several triangles, and of those that meet them out of order.
+/// Checks both orders.
 fn followed(view: impl Fn(&Cave, u64) -> View + Sync) -> [usize; 2] {
     let met = (0..48u64).into_par_iter().map(|seed| {
         let cave = Arc::new(cave([60, 45], seed / 6));
@@ -165,8 +167,7 @@ fn followed(view: impl Fn(&Cave, u64) -> View + Sync) -> [usize; 2] {
     met.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
-/// From outside all of them; from inside all but those that the walk of one field has out of order, too, where the eye's own
-/// row and column of pages have land on both sides of it.
+/// Rays meet triangles in order from outside and from inside, including the eye's own row and column of pages.
 #[test]
 fn rays_meet_floor_and_ceiling_in_order() {
     let [[outside, wrong], [inside, unsorted]] = [followed(from_outside), followed(view)];
@@ -175,7 +176,7 @@ fn rays_meet_floor_and_ceiling_in_order() {
     assert!(inside > 5000 && unsorted == 0, "{unsorted} of {inside}");
 }
 
-/// At every sample in sight, of the floor and of the ceiling.
+/// Measures every visible sample of the floor and of the ceiling.
 #[test]
 fn both_surfaces_are_within_the_tolerance() {
     let largest = (0..40u64).into_par_iter().map(|seed| {
@@ -200,35 +201,35 @@ fn both_surfaces_are_within_the_tolerance() {
     assert!(largest <= 1.0 && largest > 0.3, "{largest} of the tolerance");
 }
 
-/// What the prover is there to refute.
+/// Checks that the watertightness test detects defects.
 #[test]
-fn caves_that_are_not_closed_are_refuted() {
+fn defects_of_caves_are_detected() {
     let cave = Arc::new(cave([64, 49], 3));
     let view = whole(&cave, 1e-3);
     let (field, frustum) = (cave.floor(), view.frustum());
     let whole = drawn(&cave, &mut strips(&cave, &[]), &view);
     assert!(prove_cave(field, &frustum, &whole).is_ok());
-    let is_refuted = |triangles: &[Drawn]| prove_cave(field, &frustum, triangles).is_err();
+    let is_detected = |triangles: &[Drawn]| prove_cave(field, &frustum, triangles).is_err();
     let is_inside = |t: &Drawn| t.corners.iter().all(|c| c.x > 0 && c.z > 0 && c.x < 63 && c.z < 48);
     let is_open = |t: &Drawn| t.corners.iter().all(|c| !cave.is_rock(c.x as u32, c.z as u32));
     let inner = whole.iter().position(|t| is_inside(t) && is_open(t)).expect("a triangle inside");
-    // One alone, a pair left out, one twice.
+    // A single triangle removed, a pair removed, and a triangle duplicated.
     let without = |gone: &dyn Fn(&Drawn) -> bool| whole.iter().filter(|t| !gone(t)).copied().collect::<Vec<_>>();
-    assert!(is_refuted(&without(&|t| *t == whole[inner])));
+    assert!(is_detected(&without(&|t| *t == whole[inner])));
     let in_plan = |t: &Drawn| {
         let mut corners = t.corners.map(|c| (c.x, c.z));
         corners.sort_unstable();
         corners
     };
-    assert!(is_refuted(&without(&|t| in_plan(t) == in_plan(&whole[inner]))));
-    assert!(is_refuted(&[&whole[..], &whole[inner..=inner]].concat()));
-    // The ceiling above the floor where they should meet, or below it.
+    assert!(is_detected(&without(&|t| in_plan(t) == in_plan(&whole[inner]))));
+    assert!(is_detected(&[&whole[..], &whole[inner..=inner]].concat()));
+    // The ceiling above or below the floor where they should meet.
     for up in [0.5, -0.5] {
         let lifted = whole.iter().map(|t| {
             let up = if surface::doubled_area(&t.corners) > 0 { 0.0 } else { up };
             let lift = |c: surface::Corner| surface::Corner { y: c.y + up, ..c };
             Drawn { corners: t.corners.map(lift), ..*t }
         });
-        assert!(is_refuted(&lifted.collect::<Vec<_>>()));
+        assert!(is_detected(&lifted.collect::<Vec<_>>()));
     }
 }

@@ -1,4 +1,4 @@
-//! Sorted strips with a far plane that comes closer as the eye comes down.
+//! Sorted strips with a far plane that approaches as the eye descends.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn select(strips: &mut dyn Technique, view: &View) -> DrawList {
 }
 
 #[test]
-fn terrain_is_drawn_as_far_as_the_list_says() {
+fn terrain_is_drawn_up_to_the_stated_reach() {
     let field = terrain();
     for level in ["level=certified", "level=uniform"] {
         let mut strips = technique(&field, "sorted-strips", &[level, "page=16", "far=4"]);
@@ -49,7 +49,7 @@ fn terrain_is_drawn_as_far_as_the_list_says() {
                 watertight::prove_list(&field, &view, strips.pipeline_requirements().seams, strips.resident(), list)
             };
             prove(&list).unwrap_or_else(|why| panic!("{level} {above_m} m: {why}"));
-            // A list that said that it reaches further would be found out.
+            // A list with a false, greater reach must be detected.
             list.reach_m *= 2.0;
             assert_eq!(prove(&list).map_err(|why| why.kind).err(), Some(Kind::Gap), "{level} {above_m} m");
         }
@@ -57,7 +57,7 @@ fn terrain_is_drawn_as_far_as_the_list_says() {
 }
 
 #[test]
-fn lower_down_there_is_less_terrain() {
+fn reach_shrinks_with_eye_height() {
     let field = terrain();
     let load = |far: &str| {
         let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=8", "page=16", far]);

@@ -1,4 +1,4 @@
-//! Sorted strips beside the picture: what a turn of the head brings into sight is as fine as it will be.
+//! Sorted strips beside the picture: terrain that a rotation brings into view is already fine enough.
 
 use std::sync::Arc;
 
@@ -12,8 +12,8 @@ use super::technique;
 
 const TOLERANCE: Tolerance = Tolerance { px: 1.0, metric: Metric::Certified };
 
-/// The largest jump, pixels, and the triangles, while the head turns by `degrees` at a time.
-fn turned(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
+/// Returns the largest jump, pixels, and the triangles, while the view rotates by `degrees` per frame.
+fn rotate(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
     let mut field = synth::synth(synth::Kind::Fractal, [257, 257], 5);
     field.spacing = [20.0, 20.0];
     let field = Arc::new(field);
@@ -32,7 +32,7 @@ fn turned(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
         if let Some((from, old)) = &before {
             let state = |view, list| pop::State { view, resident: strips.resident(), list };
             let found = pop::pop(&field, state(from, old), state(&view, &list));
-            assert!(found.samples > 1000, "land is seen twice");
+            assert!(found.samples > 1000, "terrain is visible in both frames");
             largest_px = largest_px.max(found.max_px);
         }
         before = Some((view, list));
@@ -41,10 +41,10 @@ fn turned(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
 }
 
 #[test]
-fn a_turn_of_the_head_brings_nothing_coarse_into_sight() {
+fn rotation_within_the_band_does_not_pop() {
     let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
-    let (open_px, min) = turned("guard=0", lens, 8.0);
-    let (kept_px, max) = turned("guard=0.25", lens, 8.0);
+    let (open_px, min) = rotate("guard=0", lens, 8.0);
+    let (kept_px, max) = rotate("guard=0.25", lens, 8.0);
     println!("jumps of {open_px} px without a band and {kept_px} px with it, {min} and {max} triangles");
     // Both lists are within the tolerance, each in its own view.
     assert!(kept_px <= 3.0 * TOLERANCE.px && open_px > 5.0 * TOLERANCE.px, "{kept_px} {open_px}");
@@ -52,8 +52,8 @@ fn a_turn_of_the_head_brings_nothing_coarse_into_sight() {
 }
 
 #[test]
-fn a_turn_beyond_the_band_is_not_guarded() {
+fn rotation_beyond_the_band_pops() {
     let lens = Lens::Perspective { fov_x: 60f64.to_radians() };
-    let (px, _) = turned("guard=0.02", lens, 25.0);
+    let (px, _) = rotate("guard=0.02", lens, 25.0);
     assert!(px > 5.0 * TOLERANCE.px, "{px}");
 }

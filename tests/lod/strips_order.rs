@@ -1,5 +1,5 @@
-//! Sorted strips on the screen: along the ray of every pixel triangles come in order, and what the painter's
-//! algorithm makes of that without a depth buffer.
+//! Sorted strips on the screen: checks the order of triangles along the ray of every pixel, and the picture of the
+//! painter's algorithm without a depth buffer.
 
 use std::sync::Arc;
 
@@ -16,27 +16,27 @@ use rayon::prelude::*;
 
 use super::technique;
 
-/// Pixels of a small picture.
+/// Size of a small picture, pixels.
 pub(super) const SIZE: [u32; 2] = [48, 32];
 
-/// What the rays of a picture's pixels meet.
+/// Results of following the rays of a picture's pixels.
 #[derive(Debug, Default, Clone, Copy)]
-pub(super) struct Met {
-    /// Pixels with land.
+pub(super) struct RayCounts {
+    /// Pixels with terrain.
     terrain: usize,
     /// Pixels whose ray meets several triangles.
     pub(super) several: usize,
-    /// Of these, those whose triangles do not come nearest first.
+    /// Of these, pixels whose triangles are not in front-to-back order.
     pub(super) unsorted: usize,
-    /// Pixels that show another triangle without a depth buffer, drawn back to front.
+    /// Pixels that show another triangle when drawn back to front without a depth buffer.
     wrong: usize,
 }
 
-impl Met {
-    fn plus(self, other: Met) -> Met {
+impl RayCounts {
+    fn plus(self, other: RayCounts) -> RayCounts {
         let [a, b] = [self, other];
         let (terrain, several) = (a.terrain + b.terrain, a.several + b.several);
-        Met { terrain, several, unsorted: a.unsorted + b.unsorted, wrong: a.wrong + b.wrong }
+        RayCounts { terrain, several, unsorted: a.unsorted + b.unsorted, wrong: a.wrong + b.wrong }
     }
 }
 
@@ -54,7 +54,7 @@ fn triangles(field: &Field, view: &View, list: &DrawList) -> Vec<Drawn> {
     expand::triangles(field, &Frame::placing(field, view), &Geometry::default(), list)
 }
 
-/// Where rays of a view begin and lead.
+/// Returns the origin and the direction of a pixel's ray.
 fn ray(view: &View, pixel: DVec2) -> (DVec3, DVec3) {
     let offset = (pixel - DVec2::new(f64::from(SIZE[0]), f64::from(SIZE[1])) / 2.0) / view.focal_px();
     let across = view.world_from_eye * DVec3::new(offset.x, -offset.y, 0.0);
@@ -64,7 +64,7 @@ fn ray(view: &View, pixel: DVec2) -> (DVec3, DVec3) {
     }
 }
 
-/// How far along a ray it meets a triangle.
+/// Returns the distance along a ray to a triangle; `None` if it misses.
 fn distance(corners: &[DVec3; 3], (from, towards): (DVec3, DVec3)) -> Option<f64> {
     let [a, b, c] = corners;
     let (side, other) = (*b - *a, *c - *a);
@@ -78,13 +78,13 @@ fn distance(corners: &[DVec3; 3], (from, towards): (DVec3, DVec3)) -> Option<f64
     inside.then(|| other.dot(turned) / scale)
 }
 
-/// Follows the ray of every pixel through triangles that come nearest first.
-pub(super) fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> Met {
+/// Follows the ray of every pixel through triangles that should be nearest first.
+pub(super) fn follow(field: &Field, view: &View, triangles: &[Drawn]) -> RayCounts {
     follow_between(field, view, triangles, 0)
 }
 
-/// The same through triangles whose corners have so many fraction bits.
-fn follow_between(field: &Field, view: &View, triangles: &[Drawn], fraction_bits: u32) -> Met {
+/// The same for corners with `fraction_bits` fractional bits.
+fn follow_between(field: &Field, view: &View, triangles: &[Drawn], fraction_bits: u32) -> RayCounts {
     let at = |corner: &surface::Corner| surface::world(field, corner, fraction_bits);
     let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.corners.each_ref().map(at)).collect();
     let pixels = (0..SIZE[0] * SIZE[1]).into_par_iter();
@@ -92,14 +92,14 @@ fn follow_between(field: &Field, view: &View, triangles: &[Drawn], fraction_bits
         let centre = DVec2::new(f64::from(k % SIZE[0]) + 0.5, f64::from(k / SIZE[0]) + 0.5);
         let ray = ray(view, centre);
         let met: Vec<f64> = corners.iter().filter_map(|c| distance(c, ray)).filter(|&t| t > view.near).collect();
-        let Some(nearest) = met.iter().copied().reduce(f64::min) else { return Met::default() };
-        // On a common edge two triangles are as far.
+        let Some(nearest) = met.iter().copied().reduce(f64::min) else { return RayCounts::default() };
+        // Two triangles are equally distant on a common edge.
         let slack = 1e-9 * nearest.abs();
         let unsorted = met.windows(2).any(|pair| pair[0] > pair[1] + slack);
         let wrong = met[0] > nearest + slack;
-        Met { terrain: 1, several: usize::from(met.len() > 1), unsorted: unsorted.into(), wrong: wrong.into() }
+        RayCounts { terrain: 1, several: usize::from(met.len() > 1), unsorted: unsorted.into(), wrong: wrong.into() }
     };
-    pixels.map(of_pixel).reduce(Met::default, Met::plus)
+    pixels.map(of_pixel).reduce(RayCounts::default, RayCounts::plus)
 }
 
 fn view(eye: DVec3, rotation: glam::DMat3, lens: Lens) -> View {
@@ -113,7 +113,8 @@ fn terrain() -> Arc<Field> {
     Arc::new(field)
 }
 
-/// From beyond the land's corners, or of parallel rays: no row or column of pages has the eye on two sides.
+/// Returns perspective and orthographic views from beyond the field's corners. No row or column of pages has terrain on
+/// two sides of the eye.
 fn from_outside(field: &Field) -> Vec<View> {
     let [w, h] = field.size().map(|n| f64::from(n - 1));
     let range = field.statistics();
@@ -129,7 +130,7 @@ fn from_outside(field: &Field) -> Vec<View> {
     around.collect()
 }
 
-/// From within the land, low above it, in all directions; steeply down, and rolled.
+/// Returns views from within the field, low above it in all directions, and steeply down with roll.
 fn from_inside(field: &Field) -> Vec<View> {
     let at = |x: u32, z: u32, above: f64| field.world(x, z) + DVec3::Y * above;
     let lens = Lens::Perspective { fov_x: 1.4 };
@@ -141,14 +142,14 @@ fn from_inside(field: &Field) -> Vec<View> {
     around.chain(down).collect()
 }
 
-fn met(field: &Arc<Field>, views: &[View], settings: &[&str]) -> Met {
+fn met(field: &Arc<Field>, views: &[View], settings: &[&str]) -> RayCounts {
     let mut strips = technique(field, "sorted-strips", settings);
     let of_view = |view: &View| {
         let list = list(strips.as_mut(), view);
         watertight::prove_list(field, view, strips.pipeline_requirements().seams, strips.resident(), &list).unwrap();
         follow_between(field, view, &triangles(field, view, &list), list.fraction_bits)
     };
-    views.iter().map(of_view).fold(Met::default(), Met::plus)
+    views.iter().map(of_view).fold(RayCounts::default(), RayCounts::plus)
 }
 
 #[test]
@@ -173,7 +174,7 @@ fn from_inside_every_ray_meets_triangles_in_order() {
     }
 }
 
-/// Every named path: along each ray triangles in order, so a painter without a depth buffer draws no pixel wrong.
+/// Checks every named path, so that the painter's algorithm draws no pixel wrong.
 #[test]
 fn on_every_named_path_every_ray_meets_triangles_in_order() {
     let field = terrain();
@@ -181,7 +182,7 @@ fn on_every_named_path_every_ray_meets_triangles_in_order() {
     let views =
         |path: &paths::Path| path.views(&field, 200, SIZE, tolerance).into_iter().step_by(19).collect::<Vec<_>>();
     for settings in [["level=certified", "page=64"], ["level=uniform", "page=16"]] {
-        let mut all = Met::default();
+        let mut all = RayCounts::default();
         for path in paths::PATHS {
             let met = met(&field, &views(path), &settings);
             println!("{settings:?} {}: {met:?}", path.name);
@@ -192,10 +193,10 @@ fn on_every_named_path_every_ray_meets_triangles_in_order() {
     }
 }
 
-/// Vertices that slide take lines between quads along, and the walk knows quads by where they stand: the order of few
-/// rays suffers.
+/// Sliding vertices move the lines between quads, but the walk orders quads by their unmorphed positions, so a few rays
+/// are out of order.
 #[test]
-fn where_vertices_slide_few_rays_meet_triangles_out_of_order() {
+fn few_rays_are_unsorted_with_sliding_vertices() {
     let field = terrain();
     let views = [from_outside(&field), from_inside(&field)].concat();
     let [still, sliding] =
@@ -203,7 +204,7 @@ fn where_vertices_slide_few_rays_meet_triangles_out_of_order() {
     println!("{still:?} {sliding:?}");
     assert_eq!((still.unsorted, still.wrong), (0, 0));
     assert!(sliding.several > 500 && sliding.wrong > 0 && 50 * sliding.wrong < sliding.terrain, "{sliding:?}");
-    // So a painter would not do.
+    // The painter's algorithm is therefore replaced by a depth buffer.
     let depth_mode = |blend: &str| {
         technique(&field, "sorted-strips", &["level=uniform", "order=painter", blend])
             .pipeline_requirements()
@@ -212,9 +213,9 @@ fn where_vertices_slide_few_rays_meet_triangles_out_of_order() {
     assert_eq!(["blend=height", "blend=end"].map(depth_mode), [DepthMode::Painter, DepthMode::Buffer]);
 }
 
-/// The list as it is, and turned round: the same triangles, the last one first.
+/// Compares the list with its reverse: the same triangles, the last one first.
 #[test]
-fn back_to_front_is_the_same_list_turned_round() {
+fn back_to_front_is_the_reversed_list() {
     let field = terrain();
     for view in from_inside(&field).iter().step_by(3) {
         let [front, mut back] = ["order=front", "order=back"]
@@ -228,7 +229,7 @@ fn back_to_front_is_the_same_list_turned_round() {
 }
 
 #[test]
-fn on_one_core_the_list_is_the_same() {
+fn serial_walk_gives_the_same_list() {
     let field = terrain();
     let (mut rows, mut parallel_rows) = (0, 0);
     for level in ["level=certified", "level=uniform"] {
@@ -236,7 +237,7 @@ fn on_one_core_the_list_is_the_same() {
             let [parallel, serial] = ["sorted-strips", "sorted-strips:serial"].map(|name| {
                 let mut strips = technique(&field, name, &[level, "page=16"]);
                 let all = View { tolerance: Tolerance { px: 1e-6, ..view.tolerance }, ..view };
-                // A frame after a large one is walked on all cores.
+                // The frame after a large one is walked on all cores.
                 [all, view, view].map(|view| {
                     let mut list = DrawList::default();
                     strips.select(&view, &mut list);
@@ -253,6 +254,6 @@ fn on_one_core_the_list_is_the_same() {
             }
         }
     }
-    println!("{rows} rows of pages, {parallel_rows} of them walked side by side");
-    assert!(parallel_rows >= 100 && rows > 2 * parallel_rows, "{rows} rows of pages, {parallel_rows} side by side");
+    println!("{rows} rows of pages, {parallel_rows} of them walked in parallel");
+    assert!(parallel_rows >= 100 && rows > 2 * parallel_rows, "{rows} rows of pages, {parallel_rows} in parallel");
 }

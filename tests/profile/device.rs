@@ -19,7 +19,7 @@ use crate::gpu::{aslant, mountains, on_device, technique};
 /// Makes a scene of a field and lends it.
 fn with_scene<T>(gpu: &Arc<Gpu>, field: &Arc<Field>, f: impl FnOnce(&Scene) -> T) -> T {
     let look = Look::default();
-    let plan = ScenePlan::new(field, &look, &gpu.device_limits()).unwrap();
+    let plan = ScenePlan::builder(field, &look, &gpu.device_limits()).build().unwrap();
     f(&Scene { gpu, field, plan: &plan, look: &look, overlay: None })
 }
 

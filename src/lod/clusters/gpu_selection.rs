@@ -1,20 +1,20 @@
-//! The selection on the device: the quadtree as a table, and the programs in their order.
+//! GPU-driven selection: the quadtree as a table, and the sequence of compute shaders.
 //!
-//! Level by level from the root the children of split nodes are tested, one invocation each; level by level from the
-//! finest their coarser neighbours are split too; then each split node finds what it draws, is counted with those of
-//! its seed, and writes its instance behind theirs. Split nodes stand in a table of open addressing (linear probing,
-//! at most half full), which invocations fill by compare and swap. Ratios only ever decrease: the order of arrival
-//! does not matter, and what is drawn is what the host would draw.
+//! From the root down, level by level, the children of split nodes are tested with one invocation each. From the finest
+//! level up, their coarser neighbours are split too. Then each split node determines its cluster, is counted with those
+//! of its seed, and writes its instance after theirs. Split nodes are stored in a hash table with open addressing
+//! (linear probing, at most half full), which invocations fill by compare and swap. Error margins only ever decrease,
+//! so the result does not depend on the order of execution and equals the host's.
 //!
-//! More split nodes than there is room for set a flag; then the root is drawn as one block.
+//! If there are more split nodes than the table holds, a flag is set and the root is drawn as one block.
 
+use super::layout::{ClusterScratch, ClusterTree, ClusterView};
 use super::mesh::Mesh;
 use super::morph_ranges::MORPH_RANGES;
 use super::states::Seeds;
 use super::tree::{Errors, Tree};
 use crate::draw::Seams;
 use crate::draw::gpu_selection::{GpuSelection, Groups, Step};
-use crate::draw::layout::{ClusterScratch, ClusterTree, ClusterView};
 
 const PROGRAMS: &[&str] = &[
     "cluster_refine.comp",
@@ -26,22 +26,22 @@ const PROGRAMS: &[&str] = &[
 ];
 const REFINE: usize = 0;
 const RESTRICT: usize = 1;
-/// Once for each split node.
+/// Runs once for each split node.
 const BLOCKS: usize = 2;
 const STATES: usize = 3;
 const COMMANDS: usize = 4;
 const INSTANCES: usize = 5;
 
-/// Words of a level's row in the scratch, and where in it are the groups for the children of its split nodes, and for
-/// those themselves: as in `shaders/cluster_splits.glsl`.
+/// Words of a level's row in the scratch buffer, and the offsets of the group counts for the children of its split
+/// nodes and for these nodes; as in `shaders/cluster_splits.glsl`.
 const ROW: u32 = 8;
 const CHILDREN: u32 = 1;
 const NODES: u32 = 4;
 
-/// Ids of nodes that may be split take at most a word.
+/// Maximum number of levels, so that the ids of nodes that may be split fit one word.
 const MAX_LEVELS: u32 = 17;
 
-/// Room in the scratch, given out in turn.
+/// Sequential allocator of scratch memory, in words.
 struct ScratchLayout(u32);
 
 impl ScratchLayout {
@@ -52,7 +52,8 @@ impl ScratchLayout {
     }
 }
 
-/// The selection of clusters of a quadtree, at most `max` nodes of it split. `None` if no device need be able to.
+/// Builds the selection for a quadtree, with at most `max` split nodes. `None` if it exceeds what every device
+/// supports.
 pub fn gpu_selection(
     tree: &Tree,
     cells: u32,
@@ -102,17 +103,18 @@ pub fn gpu_selection(
     gpu_selection.fits().then_some(gpu_selection)
 }
 
-/// Words before the scratch's own.
+/// Words before the scratch buffer's allocated part.
 const HEAD: usize = size_of::<ClusterScratch>() / 4;
 
-/// The head, then levels, states, ranges and squares. Split nodes of each level get their room.
+/// Returns the table: header, levels, states, index ranges and squares. Allocates scratch memory for the split nodes of
+/// each level.
 fn table(tree: &Tree, seeds: &Seeds, mesh: &Mesh, head: &mut ClusterTree, scratch: &mut ScratchLayout) -> Vec<u32> {
     let mut levels: Vec<u32> = Vec::new();
     let mut squares: Vec<u32> = Vec::new();
     head.states = 5 * (head.root + 1);
     head.ranges = head.states + 81;
     let before = head.ranges + 2 * head.seeds;
-    // No device need know of infinite numbers.
+    // Devices need not support infinities.
     let finite = |metres: f32| metres.clamp(f32::MIN, f32::MAX).to_bits();
     for level in 0..=head.root {
         let ([x, z], held) = tree.bounds.held(level);

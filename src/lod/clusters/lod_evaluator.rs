@@ -1,108 +1,104 @@
-//! What a view says about a node: whether it is in sight, and what the tolerance allows in it over its ε.
+//! Evaluates nodes for a view: their visibility, and their error margin, the allowed error divided by the node's error
+//! ε.
 //!
-//! `shaders/cluster_lod.glsl` has the same functions, and the two agree to the bit: single precision, relative to
-//! the eye, and nothing but sums, products, comparisons and integers, which Vulkan rounds as the host does. Roots and
-//! inverses are Newton steps from an integer's start. Tiny and huge values are kept away: a device may flush what is
-//! subnormal.
+//! `shaders/cluster_lod.glsl` has the same functions with bit-identical results. They use single precision relative to
+//! the eye, and only sums, products, comparisons and integers, which Vulkan rounds as the host does. Roots and inverses
+//! are Newton steps from an integer estimate. Values are clamped away from tiny and huge ones, because a device may
+//! flush subnormal numbers.
 //!
-//! What is rounded errs on the safe side. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves and a sum
-//! along a direction by 12 u of its terms, which [`SLACK`] covers. The ratio is at most 80 u and twice what
-//! [`inverse_roots`] lacks above the true one, less than 2⁻¹⁶: [`GUARD`] takes four times that off.
+//! Rounding is conservative. With u = 2⁻²⁴, coordinates are off by at most 7 u of themselves. A sum along a direction
+//! is off by at most 12 u of its terms, which [`SLACK`] covers. The error margin exceeds the true one by at most 80 u
+//! and twice the error of [`inverse_roots`], less than 2⁻¹⁶; [`GUARD`] subtracts four times that.
 //!
-//! A node in another is in sight only if that is, rounding included: every step is monotone in the node's corners.
+//! A node inside another is visible only if the other one is, rounding included, because every step is monotonic in the
+//! node's corners.
 //!
-//! The host looks at the four children of a node at once, a lane each.
+//! The host evaluates the four children of a node at once, one per SIMD lane.
 
 use glam::Vec4;
 
+use super::layout::{CERTIFIED, ClusterView, DISTANCE, EVEN, PAPER};
 use super::morph_ranges::{MorphRanges, NODE_END};
 use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
-use crate::draw::layout::ClusterView;
-use crate::draw::place::RenderOrigin;
+use crate::draw::layout::RenderOrigin;
 use crate::height::bounds::Square;
 use crate::view::{Containment, Lens, Metric, View};
 
-/// Times the true ratio, so that rounding never allows more than [`crate::view::Allowance::error`].
+/// Factor on error margins, so that rounding never allows more than [`crate::view::Allowance::error`].
 const GUARD: f32 = 1.0 - 1.0 / 16384.0;
-/// Of the terms of a sum along a direction: more than rounding may change it.
+/// Relative bound on the rounding of a sum along a direction.
 const SLACK: f32 = 1.0 / (1 << 19) as f32;
-/// Coordinates end here, metres.
+/// Maximum absolute coordinate, metres.
 const FARTHEST: f32 = 1e12;
-/// Depths end here, metres: nearer allows less.
+/// Maximum depth, metres; a smaller depth allows less.
 const DEEPEST: f32 = 1e10;
-/// Errors and squares of lengths begin here.
+/// Minimum of errors and of squared lengths.
 const MIN: f32 = 1e-18;
-/// Errors begin here, metres, unless they are 0.
+/// Minimum error, metres, unless it is 0.
 const MIN_ERROR: f32 = 1e-12;
-/// The ratio of a node without error: never reached.
+/// Error margin of a node without error.
 pub const WITHOUT_ERROR: f32 = 1e30;
 
-/// See [`ClusterView::metric`].
-const CERTIFIED: u32 = 0;
-const PAPER: u32 = 1;
-const EVEN: u32 = 2;
-const DISTANCE: u32 = 3;
-
-/// A view of a quadtree.
+/// Evaluates nodes of a quadtree for one view.
 pub struct LodEvaluator<'a> {
     /// The quadtree.
     pub tree: &'a Tree,
-    /// The view, as the device gets it too.
+    /// The view, as uploaded to the device.
     pub view: ClusterView,
-    /// What it says of levels where their distance alone counts.
+    /// Distances at which levels morph, with `morph=distance`.
     pub ranges: MorphRanges,
 }
 
-/// Four boxes relative to the eye, metres, a lane each: x, y and z.
+/// Four boxes relative to the eye, metres, one per lane: x, y and z.
 #[derive(Clone, Copy, Debug)]
 struct Extents {
     low: [Vec4; 3],
     high: [Vec4; 3],
 }
 
-/// What is looked at of one node: its containment and its ratio, or nothing if it has no land.
+/// Containment and error margin of a node; `None` if it has no data.
 pub type NodeVisibility = Option<(Containment, f32)>;
 
 impl<'a> LodEvaluator<'a> {
-    /// A view whose tolerance has a band from 1 to `band_end`. `culls`: nodes out of sight are left as they are; else
-    /// they are not, so that no turn of the eye changes what is seen.
+    /// Creates the evaluator of a view whose morph band is from error margin 1 to `band_end`. Without `culls`,
+    /// invisible nodes are refined too, so that rotating the eye does not change visible ones.
     pub fn new(tree: &'a Tree, view: &View, band_end: f32, culls: bool) -> Self {
         Self { tree, view: cluster_view(tree, view, band_end, culls), ranges: MorphRanges::default() }
     }
 
-    /// A view in which vertices go over to the next level by their own distance.
+    /// Creates the evaluator of a view in which vertices morph to the next level by their own distance.
     pub fn by_distance(tree: &'a Tree, view: &View) -> Self {
         let ranges = MorphRanges::new(tree, view);
-        let known = cluster_view(tree, view, NODE_END, true);
-        let view = ClusterView { metric: DISTANCE, band_scale: 0.0, above_squared: ranges.above_squared, ..known };
+        let base = cluster_view(tree, view, NODE_END, true);
+        let view = ClusterView { metric: DISTANCE, band_scale: 0.0, above_squared: ranges.above_squared, ..base };
         Self { tree, view, ranges }
     }
 
-    /// Whether vertices go over to the next level by their own distance.
+    /// Returns true if vertices morph to the next level by their own distance.
     pub fn is_by_distance(&self) -> bool {
         self.view.metric == DISTANCE
     }
 
-    /// Whether a node has land, in sight if that matters.
+    /// Returns true if a node has data, and is visible if nodes are culled.
     pub fn draws(&self, node: Node) -> bool {
         self.tree.square(node).is_some()
             && (self.view.culls == 0 || self.containment(node).is_some_and(|found| found != Containment::Outside))
     }
 
-    /// How a node lies to what can be seen, `Crossing` when in doubt; `None` if it has no land.
+    /// Returns the containment of a node in the frustum, `Crossing` if uncertain; `None` if it has no data.
     pub fn containment(&self, node: Node) -> Option<Containment> {
         let square = self.tree.square(node)?;
         Some(self.contained(&self.extent(node, square))[0])
     }
 
-    /// The error, metres, that [`RASTER_PX`] allow in a node. `None` if it has no land.
+    /// Returns the error that corresponds to [`RASTER_PX`] in a node, metres; `None` if it has no data.
     pub fn raster_m(&self, node: Node) -> Option<f32> {
         let square = self.tree.square(node)?;
         Some(self.over(self.view.skirt_scale, &self.extent(node, square), Vec4::ONE).x)
     }
 
-    /// A node by itself.
+    /// Evaluates a single node.
     pub fn evaluate(&self, node: Node) -> NodeVisibility {
         let square = self.tree.square(node)?;
         let extent = self.extent(node, square);
@@ -114,11 +110,11 @@ impl<'a> LodEvaluator<'a> {
         Some((self.contained(&extent)[0], error_margin))
     }
 
-    /// The children of a node that lies to what can be seen as `around` says: `squares` is what is known of them.
+    /// Evaluates the children of a node. `around` is the node's own containment, `squares` its children's data.
     #[inline]
     pub fn evaluate_children(&self, node: Node, around: Containment, squares: &Squares) -> [NodeVisibility; 4] {
         let extents = self.children(node, squares);
-        // What is in a node lies no other way than that, if it is not crossed by a plane.
+        // A node that no plane crosses passes its containment on to its children.
         let contained = if around == Containment::Crossing { self.contained(&extents) } else { [around; 4] };
         let finest = node.level == 1;
         let error_margins = match finest {
@@ -130,14 +126,14 @@ impl<'a> LodEvaluator<'a> {
         [evaluate(0), evaluate(1), evaluate(2), evaluate(3)]
     }
 
-    /// How the children of a node lie to what can be seen; nothing without land does.
+    /// Returns the containment of each child of a node; `Outside` for those without data.
     pub fn contained_in(&self, node: Node) -> [Containment; 4] {
         let squares = self.tree.squares(node);
         let (has_terrain, contained) = (squares.has_terrain(), self.contained(&self.children(node, &squares)));
         [0, 1, 2, 3].map(|k| if has_terrain >> k & 1 == 1 { contained[k] } else { Containment::Outside })
     }
 
-    /// The boxes around the children of a node.
+    /// Returns the boxes around the children of a node.
     #[inline]
     fn children(&self, node: Node, squares: &Squares) -> Extents {
         let (first, side) = (self.tree.first(node), self.tree.bounds.side(node.level - 1));
@@ -150,7 +146,7 @@ impl<'a> LodEvaluator<'a> {
         }
     }
 
-    /// The box around a node in every lane.
+    /// Returns the box around a node in every lane.
     fn extent(&self, node: Node, Square { range: [low, high], .. }: Square) -> Extents {
         let at = |[x, z]: [u32; 2], y: f32| {
             [Vec4::splat(self.metres(x, 0)), self.above(Vec4::splat(y)), Vec4::splat(self.metres(z, 1))]
@@ -159,17 +155,17 @@ impl<'a> LodEvaluator<'a> {
         Extents { low: at(first, low), high: at(end, high) }
     }
 
-    /// Where a sample lies relative to the eye along an axis of the plan, metres.
+    /// Returns the position of a sample relative to the eye along x or z, metres.
     #[inline]
     fn metres(&self, at: u32, axis: usize) -> f32 {
-        let metres = (at as i32 - self.view.render_origin[axis]) as f32 * self.view.spacing[axis];
-        (metres + self.view.render_origin_relative[axis]).clamp(-FARTHEST, FARTHEST)
+        let metres = (at as i32 - self.view.origin.at[axis]) as f32 * self.view.spacing[axis];
+        (metres + self.view.origin.relative[axis]).clamp(-FARTHEST, FARTHEST)
     }
 
-    /// Heights relative to the eye, metres.
+    /// Returns heights relative to the eye, metres.
     #[inline]
     fn above(&self, heights: Vec4) -> Vec4 {
-        let above = (heights - self.view.render_origin_height) + self.view.render_origin_height_relative;
+        let above = (heights - self.view.origin.height) + self.view.origin.height_relative;
         above.max(Vec4::splat(-FARTHEST)).min(Vec4::splat(FARTHEST))
     }
 
@@ -190,8 +186,8 @@ impl<'a> LodEvaluator<'a> {
         })
     }
 
-    /// What the tolerance allows over the errors of a level: below 1 they are too coarse. Never above the exact value.
-    /// By distance: how far, squared, over where the way into the level begins.
+    /// Returns the allowed error divided by the errors of a level, never above the exact value; below 1 a node is too
+    /// coarse. With `morph=distance`: the squared distance divided by that at which the morph into the level begins.
     #[inline]
     fn error_margins(&self, level: u32, extents: &Extents, errors: Vec4) -> Vec4 {
         if self.is_by_distance() {
@@ -200,7 +196,7 @@ impl<'a> LodEvaluator<'a> {
         self.over(self.view.scale, extents, errors)
     }
 
-    /// The same for a scale as [`ClusterView::scale`].
+    /// The same for a scale like [`ClusterView::scale`].
     #[inline]
     fn over(&self, scale: f32, extents: &Extents, errors: Vec4) -> Vec4 {
         let view = &self.view;
@@ -223,7 +219,8 @@ impl<'a> LodEvaluator<'a> {
     }
 }
 
-/// 1 / √x, never above it, and at most 5 · 10⁻⁶ below. The start is that of Lomont, "Fast Inverse Square Root" (2003).
+/// Returns 1 / √x, never above it and at most 5 · 10⁻⁶ below. The initial estimate is from Lomont, "Fast Inverse Square
+/// Root" (2003).
 #[inline]
 fn inverse_roots(x: Vec4) -> Vec4 {
     let start = |x: f32| f32::from_bits(0x5f37_5a86_u32.wrapping_sub(x.to_bits() >> 1));
@@ -231,7 +228,7 @@ fn inverse_roots(x: Vec4) -> Vec4 {
     newton(newton(Vec4::new(start(x.x), start(x.y), start(x.z), start(x.w))))
 }
 
-/// Distances of boxes from the eye.
+/// Returns the distances of boxes from the eye, metres.
 #[inline]
 fn distance(extents: &Extents) -> Vec4 {
     let away = |k: usize| extents.low[k].max(-extents.high[k]).max(Vec4::ZERO);
@@ -240,7 +237,8 @@ fn distance(extents: &Extents) -> Vec4 {
     square * inverse_roots(square)
 }
 
-/// Squares of their distances in plan, and of so much more in height: as `draw::distance::squared` at their nearest place.
+/// Returns the squared distances in plan plus a squared height, like `draw::distance::squared` at each box's nearest
+/// point.
 #[inline]
 fn squared_in_plan(extents: &Extents, above_squared: f32) -> Vec4 {
     let away = |k: usize| extents.low[k].max(-extents.high[k]).max(Vec4::ZERO);
@@ -248,7 +246,7 @@ fn squared_in_plan(extents: &Extents, above_squared: f32) -> Vec4 {
     (x * x + z * z) + above_squared
 }
 
-/// Largest horizontal distances of boxes from the eye.
+/// Returns the largest horizontal distances of boxes from the eye, metres.
 #[inline]
 fn farthest_aside(extents: &Extents) -> Vec4 {
     let far = |k: usize| extents.low[k].abs().max(extents.high[k].abs());
@@ -257,7 +255,7 @@ fn farthest_aside(extents: &Extents) -> Vec4 {
     square * inverse_roots(square)
 }
 
-/// The least and the greatest `direction · p` over each box, and how great its terms may be.
+/// Returns the minimum and the maximum of `direction · p` over each box, and the maximum sum of its terms' magnitudes.
 #[inline]
 fn along(direction: [f32; 3], extents: &Extents) -> [Vec4; 3] {
     let ends = |k: usize| (direction[k] * extents.low[k], direction[k] * extents.high[k]);
@@ -266,20 +264,20 @@ fn along(direction: [f32; 3], extents: &Extents) -> [Vec4; 3] {
     [sum(Vec4::min), sum(Vec4::max), sum(|a, b| a.abs().max(b.abs()))]
 }
 
-/// A value as both sides may compute with it.
+/// Converts a value to single precision, clamped so that host and device compute the same.
 fn single(value: f64) -> f32 {
     if value.abs() < 1e-12 { 0.0 } else { value.clamp(-f64::from(FARTHEST), FARTHEST.into()) as f32 }
 }
 
 fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> ClusterView {
-    let render_origin = RenderOrigin::new(tree.origin, tree.spacing, view.eye);
+    let origin = RenderOrigin::new(tree.origin, tree.spacing, view.eye);
     let planes = view.planes().map(|(normal, distance)| {
         let [x, y, z] = normal.to_array().map(single);
         [x, y, z, single(distance)]
     });
     let lean = view.forward().y.abs();
     let (metric, scale) = match (view.lens, view.tolerance.metric) {
-        // No tolerance is kept: every node is fine enough, in front of the eye too.
+        // An infinite tolerance makes every node fine enough, also in front of the eye.
         _ if view.tolerance.px == f64::INFINITY => (EVEN, 0.0),
         (Lens::Orthographic { .. }, Metric::Paper) => (EVEN, 1.0),
         (Lens::Orthographic { .. }, Metric::Certified) => (EVEN, (1.0 - lean * lean).max(0.0).sqrt()),
@@ -289,10 +287,12 @@ fn cluster_view(tree: &Tree, view: &View, band_end: f32, culls: bool) -> Cluster
     let scale_for = |px: f64| single(scale * view.focal_px() / px);
     let corner = view.corner_ray();
     ClusterView {
-        render_origin: render_origin.at,
-        render_origin_relative: render_origin.relative.map(|metres| single(metres.into())),
-        render_origin_height: single(render_origin.height.into()),
-        render_origin_height_relative: single(render_origin.height_relative.into()),
+        origin: RenderOrigin {
+            at: origin.at,
+            relative: origin.relative.map(|metres| single(metres.into())),
+            height: single(origin.height.into()),
+            height_relative: single(origin.height_relative.into()),
+        },
         spacing: tree.spacing.map(single),
         near_plane: planes[0],
         right_plane: planes[1],
@@ -326,13 +326,13 @@ mod tests {
     use crate::height::{Field, Holes, Samples};
     use crate::view::{Aabb, Tolerance};
 
-    /// A deterministic number in 0..1.
+    /// Returns a deterministic number in 0..1.
     fn random(seed: &mut u64) -> f64 {
         *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*seed >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Trees of small and of endless fields, near the origin and far from it.
+    /// Returns trees of small and of very large fields, near the origin and far from it.
     fn trees(seed: &mut u64) -> Vec<Tree> {
         let heights = |seed: &mut u64| (0..64 * 64).map(|_| 300.0 * random(seed) as f32 - 20.0).collect();
         let mut tree = |tiles: [u32; 2], spacing: [f64; 2], origin: [f64; 2]| {
@@ -348,7 +348,7 @@ mod tests {
         ]
     }
 
-    fn anywhere(tree: &Tree, seed: &mut u64) -> View {
+    fn random_view(tree: &Tree, seed: &mut u64) -> View {
         let near = random(seed) < 0.7;
         let mut at = |k: usize| tree.origin[k] + tree.spacing[k] * f64::from(tree.last[k]) * (1.2 * random(seed) - 0.1);
         let eye = DVec3::new(at(0), 0.0, at(1));
@@ -380,8 +380,8 @@ mod tests {
         Aabb { min: at(first, low), max: at(end, high) }
     }
 
-    /// A node of any level; near the eye as often as anywhere.
-    fn any_node(tree: &Tree, view: &View, seed: &mut u64) -> Node {
+    /// Returns a node of any level, half of them near the eye.
+    fn random_node(tree: &Tree, view: &View, seed: &mut u64) -> Node {
         let level = (f64::from(tree.root().level + 1) * random(seed)) as u32;
         let near = random(seed) < 0.5;
         let at = [0, 1].map(|k| {
@@ -393,14 +393,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_allowed_or_left_out_that_exact_arithmetic_does_not() {
+    fn rounding_is_conservative() {
         let mut seed = 3;
-        let (mut closest, mut farthest, mut far_of_sight) = (0.0f64, 1.0f64, [0, 0]);
+        let (mut closest, mut farthest, mut doubtful_counts) = (0.0f64, 1.0f64, [0, 0]);
         for tree in trees(&mut seed) {
             for _ in 0..200_000 {
-                let view = anywhere(&tree, &mut seed);
+                let view = random_view(&tree, &mut seed);
                 let evaluator = LodEvaluator::new(&tree, &view, 1.0, true);
-                let node = any_node(&tree, &view, &mut seed);
+                let node = random_node(&tree, &view, &mut seed);
                 let Some(square) = tree.square(node) else { continue };
                 let exact = world_box(&tree, node, square.range);
                 let error = 10f32.powf(6.0 * random(&mut seed) as f32 - 4.0);
@@ -410,29 +410,29 @@ mod tests {
                 let share = allowed / view.allowed_error(&exact).min(1e12);
                 assert!(share < 1.0, "{share} of the allowed error at {node:?}, {view:?}");
                 closest = closest.max(share);
-                // Where a box is much wider than it is far, a sum along the view axis is good for little.
+                // If a box is much wider than distant, the bound along the view axis is loose.
                 let wide = (exact.max - exact.min).length() > 1000.0 * exact.distance(view.eye).max(view.near);
                 farthest = if wide { farthest } else { farthest.min(share) };
                 let (found, truly) = (evaluator.containment(node).unwrap(), view.frustum().contains(&exact));
                 let doubtful = found == Containment::Crossing && truly != found;
                 assert!(found == truly || doubtful, "{found:?}, truly {truly:?}: {node:?}, {view:?}");
-                far_of_sight[usize::from(doubtful)] += 1;
+                doubtful_counts[usize::from(doubtful)] += 1;
             }
         }
-        println!("{farthest} to {closest} of the allowed error, in sight in doubt: {far_of_sight:?}");
+        println!("{farthest} to {closest} of the allowed error, containment in doubt: {doubtful_counts:?}");
         assert!(closest > 0.9999 && farthest > 0.99, "{farthest} to {closest} of the allowed error");
-        assert!(far_of_sight[0] > 10_000 * far_of_sight[1], "{far_of_sight:?} in doubt");
+        assert!(doubtful_counts[0] > 10_000 * doubtful_counts[1], "{doubtful_counts:?} in doubt");
     }
 
     #[test]
-    fn children_are_seen_as_by_themselves() {
+    fn children_match_single_evaluation() {
         let mut seed = 5;
         let mut seen = [0; 3];
         for tree in trees(&mut seed) {
             for _ in 0..20_000 {
-                let view = anywhere(&tree, &mut seed);
+                let view = random_view(&tree, &mut seed);
                 let evaluator = LodEvaluator::new(&tree, &view, 1.0, true);
-                let node = any_node(&tree, &view, &mut seed);
+                let node = random_node(&tree, &view, &mut seed);
                 if node.level == 0 {
                     continue;
                 }

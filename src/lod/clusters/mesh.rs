@@ -1,4 +1,4 @@
-//! The flat meshes of the clusters: one grid of vertices, and one range of indices for each seed.
+//! Builds the flat meshes of the clusters: one grid of vertices, and one range of indices for each seed.
 
 use std::ops::Range;
 
@@ -6,16 +6,17 @@ use super::states::State;
 use crate::draw::{Geometry, LatticeVertex, Seams, skirts};
 use crate::height::rtin;
 
-/// The grid with its index ranges.
+/// Vertex grid with the index ranges of all seeds.
 pub struct Mesh {
-    /// (4n + 1)² vertices, with skirts (4n + 6)²: two units a cell of a quadrant that is one block.
+    /// (4n + 1)² vertices, with skirts (4n + 6)². Two units per cell of a quadrant that is one block.
     pub geometry: Geometry,
-    /// By seed.
+    /// Index range by seed.
     pub ranges: Vec<Range<u32>>,
 }
 
 impl Mesh {
-    /// Clusters of blocks of `n` × `n` cells in these states; with skirts each quadrant has lines of its own.
+    /// Builds clusters of blocks of `n` × `n` cells in these states. With skirts, each quadrant has its own rows and
+    /// columns of vertices.
     pub fn new(n: i32, states: &[State], seams: Seams) -> Self {
         let last = match seams {
             Seams::Shared => 4 * n,
@@ -45,12 +46,13 @@ impl Mesh {
     }
 }
 
-/// Cells along a quadrant's side, and units of a cell.
+/// Returns the cells along a quadrant's side, and the units per cell.
 fn cells_of(n: i32, what: u8) -> (i32, i32) {
     [(0, 0), (n, 2), (2 * n, 1)][usize::from(what)]
 }
 
-/// The triangles of a quadrant; each begins with a vertex inside it, which alone tells the level of the whole.
+/// Returns the triangles of a quadrant. Each begins with a vertex inside the quadrant, whose level applies to the whole
+/// triangle.
 fn quadrant_triangles(n: i32, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
     let (cells, step) = cells_of(n, what);
     let grid = (0..cells).flat_map(move |j| (0..cells).map(move |i| (i, j)));
@@ -62,11 +64,11 @@ fn quadrant_triangles(n: i32, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
     })
 }
 
-/// The triangles of the skirts along a quadrant's sides, facing away from it; each begins with a skirt's vertex.
+/// Returns the triangles of the skirts along a quadrant's sides, facing outward. Each begins with a skirt vertex.
 fn skirt_triangles(n: i32, what: u8) -> impl Iterator<Item = [[i32; 2]; 3]> {
     let (cells, step) = cells_of(n, what);
     let last = 2 * n;
-    // Around the quadrant with the land on the left, seen from above: along a side, and beyond it.
+    // Around the quadrant with the terrain on the left, seen from above: along a side, and beyond it.
     let sides = (0..4).flat_map(move |side| (0..cells).map(move |k| (side, step * k, step * (k + 1))));
     sides.flat_map(move |(side, from, to)| {
         let at = |along: i32, beyond: i32| match side {

@@ -1,31 +1,34 @@
-//! Symmetric cluster sets: a quadtree of blocks, drawn as few batches of few kinds.
+//! Symmetric cluster sets: a quadtree of blocks, drawn as a few batches of at most 23 kinds.
 //!
-//! After J. Judnich and N. Ling, "Symmetric Cluster Set Level of Detail for Real-Time Terrain Rendering" (2012). A
-//! leaf of the quadtree is a block of n × n cells. A node and the two levels below it make a cluster, whose quadrants
-//! hold nothing, a block, or 2 × 2 blocks: 80 states, 23 up to quarter turns, each a range of indices into one grid
-//! of vertices that the height texture displaces. Turns are swaps of integers on the lattice.
+//! Based on J. Judnich and N. Ling, "Symmetric Cluster Set Level of Detail for Real-Time Terrain Rendering" (2012). A
+//! leaf of the quadtree is a block of n × n cells. A node and the two levels below it form a cluster; each of its
+//! quadrants is empty, a block, or 2 × 2 blocks. These are 80 states, of which 23 differ under quarter turns. Each is a
+//! range of indices into one grid of vertices that the height texture displaces. A quarter turn exchanges integer
+//! coordinates on the lattice.
 //!
-//! Where this differs from the paper, and why:
-//! - level 0 is the finest, as everywhere here;
-//! - 23 kinds are 23 instanced draws in one indirect submission, not a draw a cluster, which is the variant
-//!   `draw-per-cluster`; in `gpu-driven` the device finds them by itself; the baseline is `draw-per-block`: the same
-//!   triangles, a draw a block;
-//! - with the metric `certified` the error is a bound, which eq. 1 is not off the view axis;
-//! - neighbours are within one level of each other, and a side that meets a coarser block falls onto its edge: no
-//!   skirts are needed. With `seams=skirts` it is as published, and only the skirts' depth is not: it follows from
-//!   the errors of both sides and is 0 where nothing differs;
-//! - with `morph=on` the blocks in a node go over into it as eq. 3 and 4 have it, with a weight for each quadrant:
-//!   α = ½ (1 − v) for a quadrant of one block of weight v, α = ½ + ½ (1 − v) for one of four. Sides have weights
-//!   of their own, those of the coarser of their two blocks, so that both agree on them (with skirts they have not);
-//! - with `morph=distance` every vertex has a weight by its own distance, so that edges agree by themselves; for that
-//!   the error is that of a whole level (`ranges`), and finer levels reach farther than anywhere needed;
-//! - where a block sticks out of the field it does not morph: the field's edge is no vertex of the next level.
+//! Differences from the paper:
+//! - Level 0 is the finest, as everywhere in this crate.
+//! - The 23 kinds are 23 instanced draws in one indirect submission, instead of one draw per cluster (variant
+//!   `draw-per-cluster`). With `gpu-driven` the device selects the clusters. The baseline `draw-per-block` draws the
+//!   same triangles with one draw per block.
+//! - Under the metric `certified` the error is a bound; that of eq. 1 is not one off the view axis.
+//! - Neighbours are within one level of each other, and a side that meets a coarser block snaps to its edge. No skirts
+//!   are needed. `seams=skirts` is as published except for the skirts' depth, which follows from the errors of both
+//!   sides and is 0 where they do not differ.
+//! - With `morph=on` the blocks in a node morph into it by eq. 3 and 4. Each quadrant has a weight v: α = ½ (1 − v) for
+//!   a quadrant of one block, α = ½ + ½ (1 − v) for one of four. Sides have their own weights, those of the coarser of
+//!   their two blocks, so that both agree (not with skirts).
+//! - With `morph=distance` every vertex has a weight by its own distance, so edges agree by construction. The errors
+//!   are then those of whole levels (module `morph_ranges`), and finer levels extend further than needed at most
+//!   places.
+//! - A block that extends beyond the field does not morph, because the field's edge is not a vertex of the next level.
 //!
-//! Laws kept: watertight (with skirts: every gap is hidden by one), covered once, error within tolerance
-//! (`error=measured`), no state between views.
+//! Invariants: watertight (with skirts: every gap is hidden by one); the field is covered once; error within tolerance
+//! (`error=measured`); no state between views.
 
 mod collapse;
 mod gpu_selection;
+pub mod layout;
 mod lod_evaluator;
 pub mod mesh;
 mod morph_ranges;
@@ -43,7 +46,9 @@ use self::refine::Refinement;
 use self::skirts::Skirts;
 use self::states::{MAX_SEEDS, Seeds};
 use self::tree::Tree;
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
+use super::{
+    Diagnostics, Entry, Need, SelectOnGpu, Setting, Settings, Technique, Values, Variant, select_within_limits,
+};
 use crate::draw::{
     Draw, DrawList, Geometry, GpuSelection, Instance, Limits, Morph, PipelineRequirements, Seams, Source, Submission,
     Topology,
@@ -52,22 +57,22 @@ use crate::height::bounds::Measure;
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
-/// Blocks that morph begin to leave their level where the allowed error reaches their parent's, and have left it at
-/// this many times that: a longer way draws the finer level for longer, a shorter one is seen.
+/// End of the morph band: blocks start to morph where the allowed error reaches their parent's, and have morphed at
+/// this multiple of it. A wider band draws finer levels for longer, a narrower one is noticeable.
 const MORPH_RATIO: f32 = 1.3;
 
-/// The most blocks drawn, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
+/// Maximum number of blocks drawn, for which buffers are allocated. The tolerance is scaled until they suffice.
 const MAX_BLOCKS: usize = 1 << 16;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "clusters",
-    about: "quadtree of blocks, drawn as clusters of 23 kinds, turned",
+    about: "quadtree of blocks, drawn as clusters of 23 kinds and their rotations",
     paper: "Judnich & Ling 2012",
     variants: &[
-        Variant { name: "draw-per-block", about: "a recorded draw a block: the paper's baseline, CLOD" },
-        Variant { name: "draw-per-cluster", about: "a recorded draw a cluster, as published" },
-        Variant { name: "gpu-driven", about: "the device selects: no work a node on the host" },
+        Variant { name: "draw-per-block", about: "one recorded draw per block: the paper's baseline, CLOD" },
+        Variant { name: "draw-per-cluster", about: "one recorded draw per cluster, as published" },
+        Variant { name: "gpu-driven", about: "the device selects the clusters; constant work on the host" },
     ],
     settings: &[
         Setting {
@@ -80,22 +85,22 @@ pub const ENTRY: Entry = Entry {
             key: "error",
             values: Values::Words(&["measured", "halved"]),
             default: "measured",
-            about: "a block's error: against the samples, or half its parent's (eq. 2)",
+            about: "error of a block: measured against the samples, or half its parent's (eq. 2)",
         },
         Setting {
             key: "morph",
             values: Values::Words(&["off", "on", "distance"]),
             default: "off",
-            about: "blocks change at once, go over into their parent, or each vertex by its distance (no skirts)",
+            about: "off: blocks change at once; on: they morph into their parent; distance: each vertex by its distance (no skirts)",
         },
         Setting {
             key: "seams",
             values: Values::Words(&["stitched", "skirts"]),
             default: "stitched",
-            about: "where blocks meet: on common edges, or with skirts under edges of their own, as published",
+            about: "borders between blocks: stitched to common edges, or hidden by skirts, as published",
         },
     ],
-    // Vertices that morph by distance share their edges.
+    // Vertices that morph by distance always share their edges.
     needs: &[Need { key: "seams", other: "morph", words: &["off", "on"] }],
     max_samples: u64::MAX,
     max_side: MAX_SIDE,
@@ -103,7 +108,7 @@ pub const ENTRY: Entry = Entry {
     build: |field, settings| Box::new(Clusters::new(&field, settings)),
 };
 
-/// How clusters reach the device.
+/// Submission of clusters to the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     DrawPerBlock,
@@ -112,19 +117,19 @@ enum Mode {
     GpuDriven,
 }
 
-/// How blocks go over into their parent.
+/// Morph of blocks into their parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Morphing {
-    /// At once.
+    /// None: at once.
     Off,
-    /// Each block as its parent's error says.
+    /// Per block, by its parent's error.
     Blocks,
-    /// Each vertex as its distance says.
+    /// Per vertex, by its distance.
     Vertices,
 }
 
 struct Clusters {
-    /// The most clusters, or blocks, that a list holds.
+    /// Maximum number of clusters, or blocks, in a list.
     max_drawn: usize,
     gpu_selection: Option<GpuSelection>,
     tree: Tree,
@@ -136,7 +141,7 @@ struct Clusters {
     morph: Morphing,
     seams: Seams,
     measured: bool,
-    /// Seed and instance of what is drawn.
+    /// Seed and instance of each cluster to draw.
     drawn: Vec<(u32, Instance)>,
 }
 
@@ -157,17 +162,17 @@ impl Clusters {
             Some("gpu-driven") => Mode::GpuDriven,
             _ => Mode::Indirect,
         };
-        // A little more than the band is wide: no rounding puts two nodes over a place into theirs.
+        // Slightly above the band's width, so that rounding never puts two nodes over one place into their bands.
         let growth = if morph == Morphing::Blocks { MORPH_RATIO * 1.001 } else { 1.0 };
         let measure = Measure { cells, growth, errors: measured, morph: morph == Morphing::Blocks };
         let tree = Tree::new(field, measure, morph == Morphing::Vertices, &settings.progress);
         let seeds = Seeds::new(mode == Mode::DrawPerBlock);
         let mesh = Mesh::new(cells as i32, &seeds.states, seams);
-        // A quadtree has at most three leaves more for each split node.
+        // A quadtree has at most three more leaves per split node.
         let max_splits = (1..=tree.root().level).map(|level| tree.nodes(level)).sum::<usize>().min(MAX_BLOCKS / 3);
         let max_drawn = match mode {
             Mode::DrawPerBlock => tree.nodes(0).min(3 * max_splits + 1),
-            // A split node draws at most one, and a lone root is one too.
+            // Each split node draws at most one cluster; a lone root is one too.
             _ => max_splits.max(1),
         };
         let selects_on_gpu = mode == Mode::GpuDriven;
@@ -178,7 +183,8 @@ impl Clusters {
         Self { max_drawn, gpu_selection, tree, seeds, mesh, refinement, mode, cells, morph, seams, measured, drawn }
     }
 
-    /// Refines the quadtree, under a wider tolerance if there would be too many blocks, and returns its scale.
+    /// Refines the quadtree under the first tolerance at which the blocks fit, and collects its clusters. Returns the
+    /// tolerance's scale.
     fn collapse(&mut self, view: &View) -> f64 {
         let (evaluator, tolerance_scale) = select_within_limits(view, |wider| {
             let evaluator = evaluator(&self.tree, self.morph, wider);
@@ -191,7 +197,7 @@ impl Clusters {
         tolerance_scale
     }
 
-    /// A draw for each kind of cluster that occurs.
+    /// Appends one draw for each kind of cluster that occurs.
     fn draw_instanced(&self, list: &mut DrawList) {
         let mut ends = [0u32; MAX_SEEDS + 1];
         self.drawn.iter().for_each(|&(seed, _)| ends[seed as usize + 1] += 1);
@@ -208,7 +214,7 @@ impl Clusters {
         }
     }
 
-    /// The published ways: a draw for each cluster or block.
+    /// Appends one draw for each cluster or block, as published.
     fn draw_each(&self, list: &mut DrawList) {
         list.submission = Submission::Direct;
         for (batch, &(seed, instance)) in (0u32..).zip(&self.drawn) {
@@ -256,16 +262,6 @@ impl Technique for Clusters {
         }
     }
 
-    fn gpu_selection(&self) -> Option<&GpuSelection> {
-        self.gpu_selection.as_ref()
-    }
-
-    fn parameters(&self, view: &View, words: &mut Vec<u32>) {
-        let evaluator = evaluator(&self.tree, self.morph, view);
-        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&evaluator.view)));
-        words.extend(evaluator.ranges.ranges.map(f32::to_bits));
-    }
-
     fn keeps_tolerance(&self) -> bool {
         self.measured
     }
@@ -273,12 +269,34 @@ impl Technique for Clusters {
     fn pipeline_requirements(&self) -> PipelineRequirements {
         let morph = match self.morph {
             Morphing::Vertices => Morph::ByDistance,
-            // Without morphing too: sides that meet a coarser block fall onto its edge.
+            // Required without morphing too, because sides that meet a coarser block snap to its edge.
             Morphing::Off | Morphing::Blocks => Morph::ByInstance,
         };
         PipelineRequirements { morph, seams: self.seams, ..PipelineRequirements::default() }
     }
 
+    fn on_gpu(&self) -> Option<&dyn SelectOnGpu> {
+        self.gpu_selection.is_some().then_some(self as _)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl SelectOnGpu for Clusters {
+    fn selection(&self) -> &GpuSelection {
+        self.gpu_selection.as_ref().expect("only techniques with a selection say so")
+    }
+
+    fn parameters(&self, view: &View, words: &mut Vec<u32>) {
+        let evaluator = evaluator(&self.tree, self.morph, view);
+        words.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&evaluator.view)));
+        words.extend(evaluator.ranges.ranges.map(f32::to_bits));
+    }
+}
+
+impl Diagnostics for Clusters {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("kinds of clusters", self.mesh.ranges.len() as f64, ""),

@@ -1,30 +1,33 @@
-//! Where blocks of each level go over into the next one, with `morph=distance`: by the distance of every vertex.
+//! Distances at which vertices morph into each level, with `morph=distance`.
 //!
-//! The errors are those of whole levels, so that the way into a level begins at one distance, wherever a block lies. It
-//! begins where the tolerance allows what may be off then: the error of the blocks that go, and as far as a vertex
-//! goes; a cell's diagonal later, as points between vertices are nearer than these. And it begins only where the way
-//! into the level before has ended for all of a split node: so no vertex is on two ways, neighbours are within one
-//! level of each other, and where two levels meet the finer one has gone all its way and the coarser one has not begun.
+//! Errors are those of whole levels, so the morph into a level begins at the same distance for all blocks. It begins
+//! where the tolerance allows the error during the morph: the error of the blocks that morph, plus the displacement of
+//! a vertex. One cell diagonal is added, because points between vertices may be nearer than these. It also begins only
+//! where the morph into the previous level has ended for all of a split node. No vertex is therefore in two morphs, and
+//! neighbours are within one level. Where two levels meet, the finer one has fully morphed and the coarser one has not
+//! begun.
 
 use super::tree::Tree;
-use crate::draw::distance::{END, weights};
+use crate::draw::distance::{MORPH_END, weights};
+use crate::draw::weights::DistanceWeights;
 use crate::height::bounds::{Bounds, ROUNDING};
 use crate::height::{Field, level_errors};
 use crate::view::{Lens, Metric, View};
 
-/// More than single precision may change a distance by.
+/// Factor above the rounding error of distances in single precision.
 const GUARD: f64 = 1.001;
 
-/// More levels than any field has.
+/// Length of the table, above the number of levels of any field.
 pub const MORPH_RANGES: usize = 32;
 
-/// Where a way has ended for all of a node, the square of the distance over that of its beginning: no rounding matters.
-pub const NODE_END: f32 = END * 1.0001;
+/// Squared distance at which a morph has ended for all of a node, relative to that of its beginning; rounding cannot
+/// matter.
+pub const NODE_END: f32 = MORPH_END * 1.0001;
 
-/// Distances end here, metres.
+/// Maximum distance, metres.
 const FARTHEST_M: f64 = 1e12;
 
-/// What may be off, metres, while blocks go over into each level.
+/// Returns the maximum error while blocks morph into each level, metres.
 pub fn errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
     let (errors, displacements) =
         (level_errors::largest_errors(bounds), level_errors::largest_displacements(field, bounds));
@@ -32,27 +35,27 @@ pub fn errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
     let rounding = ROUNDING * low.abs().max(high.abs());
     let error = |level: usize| match level {
         0 => 0.0,
-        // Sides of level 0 on the edges of level 1 are as far off as that level's vertices go.
+        // Sides of level 0 on edges of level 1 deviate as far as that level's vertices move.
         1 => errors[1].max(displacements[1] + displacements[1]) + rounding,
         _ => errors[level].max(errors[level - 1] + displacements[level]) + rounding,
     };
     (0..errors.len()).map(error).collect()
 }
 
-/// The ways into all levels in a view.
+/// Distances of the morphs into all levels in a view.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MorphRanges {
-    /// By level, 1 over the square of the distance at which the way into it begins, 1/m².
+    /// Inverse square of the distance at which the morph into each level begins, 1/m².
     pub ranges: [f32; MORPH_RANGES],
-    /// Square of the eye's distance from all land in height, m².
+    /// Square of the eye's vertical distance from the terrain's height range, m².
     pub above_squared: f32,
 }
 
 impl MorphRanges {
-    /// The ways in a view of a quadtree whose errors are those of whole levels.
+    /// Computes the distances for a view of a quadtree whose errors are those of whole levels.
     pub fn new(tree: &Tree, view: &View) -> Self {
         if view.tolerance.px == f64::INFINITY {
-            // No tolerance is kept: the way into every level has ended, wherever the eye is.
+            // An infinite tolerance ends the morph into every level at any distance.
             return Self { ranges: [FARTHEST_M as f32; MORPH_RANGES], above_squared: FARTHEST_M as f32 };
         }
         let [low, high] = tree.bounds.square(tree.root().level, [0, 0]).range.map(f64::from);
@@ -65,27 +68,27 @@ impl MorphRanges {
             let allowed_m = allowed_from_m(view, tree.error(level, 0.0).into());
             let begin_m = GUARD * (allowed_m + cell_m).max(ended_m).min(FARTHEST_M);
             ranges[level as usize] = (1.0 / (begin_m * begin_m)) as f32;
-            ended_m = GUARD * f64::from(END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
+            ended_m = GUARD * f64::from(MORPH_END).sqrt() * begin_m + diagonal * f64::from(tree.bounds.side(level));
         }
         Self { ranges, above_squared: (above * above) as f32 }
     }
 
-    /// The weights of an instance of a level.
-    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> [u32; 4] {
-        // A root goes nowhere.
+    /// Returns the weights of an instance of a level.
+    pub fn weights(&self, level: u32, staying: u32, finer: u32) -> DistanceWeights {
+        // The root has no level to morph into.
         let into = |level: u32| self.ranges.get(level as usize).copied().unwrap_or(0.0);
         weights(staying, finer, [into(level + 1), into(level)], self.above_squared)
     }
 }
 
-/// From which distance on an error is allowed wherever in the picture it is, metres.
+/// Returns the distance from which on an error is allowed anywhere in the picture, metres.
 fn allowed_from_m(view: &View, error_m: f64) -> f64 {
     let scale = view.focal_px() / view.tolerance.px.max(f64::MIN_POSITIVE);
     let lean = view.forward().y.abs();
     match (view.lens, view.tolerance.metric) {
         (Lens::Perspective { .. }, Metric::Paper) => error_m * scale,
-        // At a distance d depths are at least d / c, for a picture corner's ray c long at unit depth, and nothing is
-        // farther aside than c times its depth.
+        // At a distance d depths are at least d / c, with c the length of the picture's corner ray at unit depth. No
+        // point is further off the axis than c times its depth.
         (Lens::Perspective { .. }, Metric::Certified) => {
             let corner = view.corner_ray();
             error_m * corner * (corner * scale + lean)
@@ -97,7 +100,7 @@ fn allowed_from_m(view: &View, error_m: f64) -> f64 {
     }
 }
 
-/// An error that is the same at every distance, so many times what is allowed.
+/// Returns the distance, metres, for an error that is `times` the allowed one at every distance: 0 or the maximum.
 fn everywhere_m(times: f64) -> f64 {
     if times < 1.0 { 0.0 } else { FARTHEST_M }
 }

@@ -1,13 +1,13 @@
-//! Which nodes of the quadtree are split in a view, and how far their blocks have gone over into them.
+//! Determines the split nodes of the quadtree in a view, and the morph weights of their blocks.
 //!
-//! A node's ratio is what the tolerance allows over its ε. It is split while that is below the end of its band, and
-//! within the band the four blocks in it go over into it: their weight rises from 0 to 1. As ε grows from child to
-//! parent by more than the band is wide, at most one of the nodes over a place is in its band.
+//! A node's error margin is the allowed error divided by its error ε. It is split while the margin is below the end of
+//! its band. Within the band its four blocks morph into it: their weight rises from 0 to 1. As ε grows from child to
+//! parent by more than the band's width, at most one of the nodes over a place is in its band.
 //!
-//! Neighbours are kept within one level of each other, weights included: a node's ratio is at most that of every
-//! finer node on its sides. It is enough to pass the ratio of each split node to the two coarser neighbours of its
-//! own outer sides, from the finest level up. Blocks of level 0 are never too coarse: stitched to a coarser neighbour
-//! they are off the samples on the common side only, which the neighbour's ε covers.
+//! Neighbours are kept within one level of each other, weights included: a node's margin is at most that of every finer
+//! node on its sides. For this it suffices to pass the margin of each split node to the two coarser neighbours on its
+//! outer sides, from the finest level up. Blocks of level 0 are never too coarse. Stitched to a coarser neighbour they
+//! deviate from the samples only on the common side, which the neighbour's ε covers.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -17,55 +17,55 @@ use super::tree::{Node, Squares, Tree};
 use crate::draw::weights::ONE;
 use crate::view::Containment;
 
-/// A node that is split.
+/// A split node.
 #[derive(Clone, Copy, Debug)]
 pub struct Split {
-    /// Which node.
+    /// The node.
     pub node: Node,
-    /// What the tolerance allows over its ε.
+    /// Allowed error divided by the node's error ε.
     error_margin: f32,
-    /// How it lies to what can be seen.
+    /// Containment in the frustum.
     containment: Containment,
-    /// Which of its children are blocks in sight, a bit each.
+    /// Children that are visible blocks, as bits.
     pub blocks: u32,
-    /// Those of its children that are split, by their place among the split nodes.
+    /// Indices of its split children in [`Refinement::splits`].
     pub children: [Option<u32>; 4],
 }
 
-/// What is found under a node's parent.
+/// Result of evaluating a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// Nothing to be drawn.
+    /// Nothing to draw.
     Nothing,
-    /// A block in sight.
+    /// A visible block.
     Block,
-    /// A split node, by its place.
+    /// A split node, by its index.
     Split(u32),
 }
 
-/// The split nodes of a view.
+/// Split nodes of a view.
 pub struct Refinement {
-    /// The most nodes that may be split.
+    /// Maximum number of split nodes.
     max: usize,
-    /// The split nodes.
+    /// Split nodes.
     pub splits: Vec<Split>,
-    /// Their places by level.
+    /// Indices of the split nodes by level.
     levels: Vec<Vec<u32>>,
     index: HashMap<u64, u32, BuildHasherDefault<NodeHasher>>,
-    /// What is known of the children of a level's split nodes.
+    /// Errors and height ranges of the children of a level's split nodes.
     squares: Vec<Squares>,
-    /// What the root is.
+    /// Result for the root.
     pub root: Found,
 }
 
 impl Refinement {
-    /// With at most `max` split nodes.
+    /// Creates an empty refinement for at most `max` split nodes.
     pub fn new(max: usize) -> Self {
         let (splits, levels, index, squares) = (Vec::new(), Vec::new(), HashMap::default(), Vec::new());
         Self { max, splits, levels, index, squares, root: Found::Nothing }
     }
 
-    /// Finds the split nodes of a view. `false` if there would be too many.
+    /// Finds the split nodes of a view. Returns false if they exceed the maximum.
     pub fn refine(&mut self, evaluator: &LodEvaluator) -> bool {
         let root = evaluator.tree.root();
         self.levels.resize_with(root.level as usize + 1, Vec::new);
@@ -82,37 +82,37 @@ impl Refinement {
         self.splits.len() <= self.max
     }
 
-    /// Splits what has to be, level by level.
+    /// Splits nodes from the root down, level by level.
     fn descend(&mut self, evaluator: &LodEvaluator) {
         let root = evaluator.tree.root();
-        self.root = self.found(evaluator, root, evaluator.evaluate(root));
+        self.root = self.classify(evaluator, root, evaluator.evaluate(root));
         for level in (1..=root.level as usize).rev() {
-            // All of a level before any is looked at: what is far away in memory comes at the same time.
+            // Loads the data of a whole level before evaluating it, so that cache misses overlap.
             self.squares.clear();
             let nodes = self.levels[level].iter().map(|&k| self.splits[k as usize].node);
             self.squares.extend(nodes.map(|node| evaluator.tree.squares(node)));
             for n in 0..self.levels[level].len() {
-                self.look_into(evaluator, self.levels[level][n], self.squares[n]);
+                self.evaluate_children(evaluator, self.levels[level][n], self.squares[n]);
             }
         }
     }
 
-    fn look_into(&mut self, evaluator: &LodEvaluator, k: u32, squares: Squares) {
+    fn evaluate_children(&mut self, evaluator: &LodEvaluator, k: u32, squares: Squares) {
         let Split { node, containment, .. } = self.splits[k as usize];
         for (quadrant, evaluate) in evaluator.evaluate_children(node, containment, &squares).into_iter().enumerate() {
-            let found = self.found(evaluator, node.child(quadrant as u32), evaluate);
-            self.splits[k as usize].hold(quadrant, found);
+            let found = self.classify(evaluator, node.child(quadrant as u32), evaluate);
+            self.splits[k as usize].set_child(quadrant, found);
         }
     }
 
-    /// What a node is that was looked at.
-    fn found(&mut self, evaluator: &LodEvaluator, node: Node, evaluate: NodeVisibility) -> Found {
+    /// Returns the result for an evaluated node, and stores it if it is split.
+    fn classify(&mut self, evaluator: &LodEvaluator, node: Node, evaluate: NodeVisibility) -> Found {
         let Some((containment, error_margin)) = evaluate else { return Found::Nothing };
         if containment == Containment::Outside && evaluator.view.culls != 0 {
             return Found::Nothing;
         }
         if error_margin >= evaluator.view.band_end || self.splits.len() > self.max {
-            return block(is_in_sight(evaluator, node, containment));
+            return block(is_visible(evaluator, node, containment));
         }
         Found::Split(self.insert(evaluator, node, error_margin, containment))
     }
@@ -127,7 +127,7 @@ impl Refinement {
         k
     }
 
-    /// Keeps the coarser neighbours on a node's own outer sides within a level of it.
+    /// Keeps the coarser neighbours on a node's outer sides within one level of it.
     fn restrict(&mut self, evaluator: &LodEvaluator, node: Node, error_margin: f32) {
         for axis in 0..2 {
             // The first child's outer side is the first side.
@@ -143,45 +143,45 @@ impl Refinement {
         }
     }
 
-    /// Splits a node that was a leaf, or in one.
+    /// Splits a node that was a leaf, or inside a leaf.
     fn split_leaf(&mut self, evaluator: &LodEvaluator, node: Node, error_margin: f32) {
         let k = self.insert(evaluator, node, error_margin, Containment::Crossing);
         for quadrant in 0..4 {
             let child = node.child(quadrant as u32);
             let found = match self.find(evaluator.tree, child) {
                 Some(place) => Found::Split(place),
-                None => block(self.is_leaf_in_sight(evaluator, child)),
+                None => block(self.is_leaf_visible(evaluator, child)),
             };
-            self.splits[k as usize].hold(quadrant, found);
+            self.splits[k as usize].set_child(quadrant, found);
         }
-        // A parent that is split later finds it.
+        // A parent that is split later finds the node in the index.
         if let Some(parent) = self.find(evaluator.tree, node.parent()) {
-            self.splits[parent as usize].hold(node.quadrant() as usize, Found::Split(k));
+            self.splits[parent as usize].set_child(node.quadrant() as usize, Found::Split(k));
         }
     }
 
-    fn is_leaf_in_sight(&self, evaluator: &LodEvaluator, node: Node) -> bool {
-        evaluator.containment(node).is_some_and(|containment| is_in_sight(evaluator, node, containment))
+    fn is_leaf_visible(&self, evaluator: &LodEvaluator, node: Node) -> bool {
+        evaluator.containment(node).is_some_and(|containment| is_visible(evaluator, node, containment))
     }
 
     fn find(&self, tree: &Tree, node: Node) -> Option<u32> {
         self.index.get(&node.id(tree.root())?).copied()
     }
 
-    /// How far the blocks in a node have gone over into it, below [`ONE`]; `None` if it is not split.
+    /// Returns the morph weight of the blocks in a node, below [`ONE`]; `None` if it is not split.
     pub fn weight(&self, evaluator: &LodEvaluator, node: Node) -> Option<u32> {
         let k = self.find(evaluator.tree, node)?;
         Some(self.splits[k as usize].weight(evaluator))
     }
 
-    /// The weight of a side of a split node, the greater of its two nodes': from [`ONE`] on the other one is not
-    /// split, and `ONE` stands for its own level. Where nothing is drawn beyond, the node's own.
+    /// Returns the weight of a side of a split node, the greater of its two nodes'. From [`ONE`] on the other node is
+    /// not split; the rest is that one's own weight. If nothing is drawn beyond the side, it is the node's own.
     pub fn side_weight(&self, evaluator: &LodEvaluator, split: &Split, side: usize) -> u32 {
         let own = split.weight(evaluator);
         let Some(beyond) = split.node.beyond(side) else { return own };
         match self.weight(evaluator, beyond) {
             Some(weight) => own.max(weight),
-            // Where all of a node is in sight, so is the side that the other one shares with it.
+            // If all of a node is visible, so is the side that the other node shares with it.
             None if evaluator.tree.square(beyond).is_none() => own,
             None if split.containment != Containment::Inside && !evaluator.draws(beyond) => own,
             None if evaluator.view.band_scale == 0.0 => ONE,
@@ -191,8 +191,8 @@ impl Refinement {
 }
 
 impl Split {
-    /// How far its blocks have gone over into it, below [`ONE`]. Where a node sticks out of the field midpoints are
-    /// none, so there they stay.
+    /// Returns the morph weight of its blocks, below [`ONE`]. A node that extends beyond the field does not morph,
+    /// because midpoints are not vertices there.
     pub fn weight(&self, evaluator: &LodEvaluator) -> u32 {
         if evaluator.view.band_scale == 0.0 || evaluator.tree.is_partial(self.node) {
             return 0;
@@ -200,7 +200,7 @@ impl Split {
         ((self.error_margin - 1.0) * evaluator.view.band_scale).clamp(0.0, (ONE - 1) as f32) as u32
     }
 
-    fn hold(&mut self, quadrant: usize, found: Found) {
+    fn set_child(&mut self, quadrant: usize, found: Found) {
         self.blocks &= !(1 << quadrant);
         match found {
             Found::Nothing => {}
@@ -210,13 +210,13 @@ impl Split {
     }
 }
 
-fn block(is_seen: bool) -> Found {
-    if is_seen { Found::Block } else { Found::Nothing }
+fn block(is_visible: bool) -> Found {
+    if is_visible { Found::Block } else { Found::Nothing }
 }
 
-/// Whether any of the finest blocks in a node may be seen: with the box of the whole alone a coarse block might be
-/// drawn where finer ones are not, and a wider tolerance would draw more.
-fn is_in_sight(evaluator: &LodEvaluator, node: Node, containment: Containment) -> bool {
+/// Returns true if any of the finest blocks in a node may be visible. Testing only the whole node's box could draw a
+/// coarse block where finer ones are culled, so that a greater tolerance would draw more.
+fn is_visible(evaluator: &LodEvaluator, node: Node, containment: Containment) -> bool {
     match containment {
         Containment::Outside => false,
         Containment::Inside => true,
@@ -224,12 +224,12 @@ fn is_in_sight(evaluator: &LodEvaluator, node: Node, containment: Containment) -
             node.level == 0
                 || (0u32..)
                     .zip(evaluator.contained_in(node))
-                    .any(|(quadrant, containment)| is_in_sight(evaluator, node.child(quadrant), containment))
+                    .any(|(quadrant, containment)| is_visible(evaluator, node.child(quadrant), containment))
         }
     }
 }
 
-/// A multiplication a node.
+/// Multiplicative hash of node ids.
 #[derive(Clone, Copy, Default)]
 struct NodeHasher(u64);
 

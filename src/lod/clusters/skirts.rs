@@ -1,71 +1,66 @@
-//! Where blocks have skirts, and how deep.
+//! Determines the sides of blocks that need skirts, and the skirts' depth.
 //!
-//! A side has one where the block beyond it is of another level, or has gone another way into its parent: elsewhere
-//! both have the same edge. The depth is the most that the gap can be. Every drawn surface is within its own error of
-//! the samples: that of its block at weight 0, and on the way to the parent's as far as the block has gone. Both edges
-//! are straight between samples of the side, so that between them lies at most the sum of the two errors; and as
-//! both go from sample to sample of the side, no more than the samples in the block are apart. Judnich & Ling 2012,
-//! section V.A, know such a bound on the screen.
+//! A side needs a skirt if the block beyond it has another level or another morph weight; otherwise both blocks have
+//! the same edge. The depth is the maximum gap. Every drawn surface is within its error of the samples: that of its
+//! block at weight 0, moving towards the parent's with the weight. Both edges are piecewise linear between samples of
+//! the side, so the gap is at most the sum of the two errors. Both edges interpolate samples of the side, so it is also
+//! at most the block's height range. Judnich & Ling 2012, section V.A, have such a bound in screen space.
 //!
-//! A little more is for the rasteriser, which may miss pixels between edges that meet in space but not in their
-//! vertices.
+//! A small margin is added for the rasteriser, which may miss pixels between edges that coincide in space but have
+//! different vertices.
 //!
-//! `shaders/cluster_skirts.glsl` has the same functions, to the bit.
+//! `shaders/cluster_skirts.glsl` has the same functions with bit-identical results.
 
 use super::lod_evaluator::LodEvaluator;
 use super::refine::Refinement;
 use super::tree::{Node, SIDES};
-use crate::draw::skirts;
-use crate::draw::weights::{self, FINER, ONE};
+use crate::draw::weights::{FINER, ONE, SkirtWeights};
 
-/// How far the rasteriser may see edges apart that are not, pixels: it rounds vertices to 1/256 of one, and a skirt may be
-/// seen from almost above.
+/// Maximum visible gap between coinciding edges after rasterisation, pixels: vertices are rounded to 1/256 of a pixel,
+/// and a skirt may be seen from almost above.
 pub const RASTER_PX: f64 = 0.125;
 
-/// Rounding of heights on their way: as `height::bounds` has it.
+/// Rounding of morphed heights, as in `height::bounds`.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// Finds the skirts of blocks.
+/// Computes the skirts of blocks.
 pub struct Skirts<'a> {
     evaluator: &'a LodEvaluator<'a>,
     refinement: &'a Refinement,
 }
 
-/// What tells the edge of a block from others.
+/// Properties that determine a block's edge.
 struct Edge {
     level: u32,
-    /// How far the block has gone over into its parent.
+    /// Morph weight of the block towards its parent.
     weight: u32,
-    /// The most, metres, by which it is off the samples.
+    /// Maximum deviation from the samples, metres.
     error_m: f32,
 }
 
 impl<'a> Skirts<'a> {
-    /// For a refinement in a view.
+    /// Creates the computation for a refinement in a view.
     pub fn new(evaluator: &'a LodEvaluator<'a>, refinement: &'a Refinement) -> Self {
         Self { evaluator, refinement }
     }
 
-    /// The weights of an instance of a level that draws these blocks, each in a quadrant: words 1 and 2 are its
-    /// skirts.
-    pub fn weights(&self, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> [u32; 4] {
-        let (mut inside, mut sides, mut depth) = ([0; 4], 0, 0.0f32);
+    /// Returns the weights of an instance of a level that draws these blocks, each in a quadrant. Words 1 and 2
+    /// describe its skirts.
+    pub fn weights(&self, level: u32, blocks: impl Iterator<Item = (u32, Node)>) -> SkirtWeights {
+        let (mut inside, mut sides, mut depth_m) = ([0; 4], 0, 0.0f32);
         for (quadrant, block) in blocks {
             let finer = if block.level < level { FINER } else { 0 };
-            inside[quadrant as usize] = self.edge(block).weight | finer;
+            inside[quadrant as usize] = (self.edge(block).weight | finer) as u8;
             for side in SIDES {
                 let Some(gap) = self.gap_m(block, side) else { continue };
                 sides |= 1 << (4 * quadrant + side as u32);
-                depth = depth.max(gap);
+                depth_m = depth_m.max(gap);
             }
         }
-        let mut weights = [0; 4];
-        (0..4).for_each(|quadrant| weights::set(&mut weights, weights::inside(quadrant), inside[quadrant]));
-        skirts::set(&mut weights, sides, depth);
-        weights
+        SkirtWeights { inside: u32::from_le_bytes(inside), sides, depth_m }
     }
 
-    /// The most, metres, that a block can be apart from what is drawn beyond a side; `None` if it is not at all.
+    /// Returns the maximum gap between a block and the surface beyond a side, metres; `None` if the edges are the same.
     fn gap_m(&self, block: Node, side: usize) -> Option<f32> {
         let tree = self.evaluator.tree;
         let (own, other) = (self.edge(block), self.edge_at(block.beyond(side)?)?);
@@ -75,11 +70,11 @@ impl<'a> Skirts<'a> {
         let [low, high] = tree.square(block)?.range;
         let [_, apart] = tree.deviation(block);
         let gap = (own.error_m + other.error_m).min(apart) + ROUNDING * low.abs().max(high.abs());
-        let second_target = self.evaluator.raster_m(block)?.min(tree.cell_m(block.level) as f32);
-        Some((gap + second_target) * (1.0 + f32::EPSILON))
+        let raster_gap = self.evaluator.raster_m(block)?.min(tree.cell_m(block.level) as f32);
+        Some((gap + raster_gap) * (1.0 + f32::EPSILON))
     }
 
-    /// What is drawn at a node: it, its parent or the blocks in it. Beyond the root is nothing.
+    /// Returns the edge drawn at a node: its own, its parent's, or that of the blocks in it. `None` beyond the root.
     fn edge_at(&self, node: Node) -> Option<Edge> {
         if node.level == self.evaluator.tree.root().level {
             return None;
@@ -100,7 +95,7 @@ impl<'a> Skirts<'a> {
         let of = |node| self.evaluator.tree.deviation(node)[0];
         let weight = self.refinement.weight(self.evaluator, block.parent()).unwrap_or(0);
         let (own, part) = (of(block), weight as f32 / ONE as f32);
-        // A root has no parent to go to.
+        // A root has no parent to morph into.
         let error_m = if weight == 0 { own } else { own + (of(block.parent()) - own) * part };
         Edge { level: block.level, weight, error_m }
     }

@@ -1,4 +1,4 @@
-//! The quadtree over a field: nothing but numbers, its nodes are made when asked for.
+//! The quadtree over a field. Nodes are plain coordinates, created on demand.
 
 use std::sync::Arc;
 
@@ -14,34 +14,34 @@ use crate::height::progress::Progress;
 pub struct Node {
     /// Level of the block that fills it.
     pub level: u32,
-    /// Place among the nodes of its level.
+    /// Place among the nodes of its level, (x, z).
     pub at: [u32; 2],
 }
 
-/// Sides of a node: x first, z first, x last, z last.
+/// Sides of a node: first x, first z, last x, last z.
 pub const SIDES: [usize; 4] = [0, 1, 2, 3];
 
 impl Node {
-    /// A child, number `q = (x half) + 2 (z half)`.
+    /// Returns the child in quadrant `q = (x half) + 2 (z half)`.
     #[inline]
     pub fn child(self, quadrant: u32) -> Node {
         let [i, j] = self.at;
         Node { level: self.level - 1, at: [2 * i + (quadrant & 1), 2 * j + (quadrant >> 1)] }
     }
 
-    /// The node that it is a child of.
+    /// Returns the parent node.
     #[inline]
     pub fn parent(self) -> Node {
         Node { level: self.level + 1, at: [self.at[0] / 2, self.at[1] / 2] }
     }
 
-    /// Which child of its parent it is.
+    /// Returns its quadrant in its parent.
     #[inline]
     pub fn quadrant(self) -> u32 {
         (self.at[0] & 1) + 2 * (self.at[1] & 1)
     }
 
-    /// The node of the same level beyond a side, if it is not before the field's first sample.
+    /// Returns the node of the same level beyond a side; `None` before the field's first sample.
     #[inline]
     pub fn beyond(self, side: usize) -> Option<Node> {
         let mut at = self.at;
@@ -50,8 +50,8 @@ impl Node {
         Some(Node { at, ..self })
     }
 
-    /// A number of its own among all nodes under a root: two bits for each level above it, and one. `None` beyond
-    /// the root.
+    /// Returns a unique number among all nodes under a root: two bits for each level below the root, and a leading one.
+    /// `None` for nodes outside the root.
     #[inline]
     pub fn id(self, root: Node) -> Option<u64> {
         let above = root.level.checked_sub(self.level)?;
@@ -61,18 +61,19 @@ impl Node {
     }
 }
 
-/// Where errors come from.
+/// Source of errors.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Errors {
     /// Measured against the samples.
     Measured,
-    /// The same for all of a level, metres: measured against the samples, on the way into it too ([`ranges`]).
+    /// One error per level, metres: measured against the samples, including the morph into the level
+    /// ([`morph_ranges`]).
     ByLevel(Vec<f32>),
-    /// Judnich & Ling 2012, eq. 2: half the parent's; the root's is the range of heights, metres.
+    /// Judnich & Ling 2012, eq. 2: half the parent's error. The root's is the range of heights, metres.
     Halved(f32),
 }
 
-/// Four squares, a lane each, as [`Square`] has them.
+/// Four squares, one per lane, like [`Square`].
 #[derive(Clone, Copy, Debug)]
 pub struct Squares {
     /// Errors, metres.
@@ -82,30 +83,30 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// Which of them have land, a bit each.
+    /// Returns which of them have data, as bits.
     #[inline]
     pub fn has_terrain(&self) -> u32 {
         self.range[0].cmple(self.range[1]).bitmask()
     }
 }
 
-/// The quadtree of a field.
+/// Quadtree of a field.
 pub struct Tree {
-    /// What was measured of its squares.
+    /// Measured errors and height ranges of its squares.
     pub bounds: Bounds,
-    /// Where its errors come from.
+    /// Source of its errors.
     pub errors: Errors,
-    /// Distance of neighbouring samples (x, z), metres.
+    /// Distance of adjacent samples (x, z), metres.
     pub spacing: [f64; 2],
-    /// Where the first sample lies (x, z), world metres.
+    /// World position of the first sample (x, z), metres.
     pub origin: [f64; 2],
-    /// The last sample.
+    /// Last sample, (x, z).
     pub last: [u32; 2],
 }
 
 impl Tree {
-    /// Measures a field for blocks of `measure.cells` × `measure.cells` cells. Without measured errors they are halved
-    /// from level to level; else they may be those of whole levels.
+    /// Measures a field for blocks of `measure.cells` × `measure.cells` cells. Without measured errors, errors are
+    /// halved from level to level. With `by_level` they are those of whole levels.
     pub fn new(field: &Arc<Field>, measure: Measure, by_level: bool, progress: &Progress) -> Self {
         let bounds = Bounds::new(field, measure, progress);
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
@@ -118,41 +119,41 @@ impl Tree {
         Self { bounds, errors, spacing: field.spacing, origin: field.origin, last }
     }
 
-    /// The node that holds the field.
+    /// Returns the node that contains the field.
     pub fn root(&self) -> Node {
         Node { level: self.bounds.levels() - 1, at: [0, 0] }
     }
 
-    /// Bytes of what was measured.
+    /// Returns the size of the measured data, bytes.
     pub fn bytes(&self) -> usize {
         self.bounds.bytes()
     }
 
-    /// Nodes of a level with cells of the field.
+    /// Returns the number of nodes of a level that overlap the field.
     pub fn nodes(&self, level: u32) -> usize {
         self.last.iter().map(|n| n.div_ceil(self.bounds.side(level)) as usize).product()
     }
 
-    /// Lattice position of a node's first vertex.
+    /// Returns the lattice position of a node's first vertex.
     #[inline]
     pub fn first(&self, node: Node) -> [u32; 2] {
         let side = self.bounds.side(node.level);
         [node.at[0] * side, node.at[1] * side]
     }
 
-    /// Lattice positions of a node's first and last vertex that are in the field.
+    /// Returns the lattice positions of a node's first and last vertex within the field.
     #[inline]
     pub fn corners(&self, node: Node) -> [[u32; 2]; 2] {
         let ([x, z], side) = (self.first(node), self.bounds.side(node.level));
         [[x, z], [(x + side).min(self.last[0]), (z + side).min(self.last[1])]]
     }
 
-    /// Whether a node sticks out of the field.
+    /// Returns true if a node extends beyond the field.
     pub fn is_partial(&self, node: Node) -> bool {
         self.bounds.is_partial(node.level, node.at)
     }
 
-    /// What is known of a node; `None` if it has no land.
+    /// Returns the error and height range of a node; `None` if it has no data.
     #[inline]
     pub fn square(&self, node: Node) -> Option<Square> {
         let [x, z] = self.first(node);
@@ -163,7 +164,7 @@ impl Tree {
         square.has_terrain().then(|| Square { error: self.error(node.level, square.error), ..square })
     }
 
-    /// What is known of a node's children, a lane each.
+    /// Returns the errors and height ranges of a node's children, one per lane.
     #[inline]
     pub fn squares(&self, node: Node) -> Squares {
         let [a, b, c, d] = self.bounds.squares(node.level - 1, node.at);
@@ -175,21 +176,21 @@ impl Tree {
         Squares { error, range: [lanes(|square| square.range[0]), lanes(|square| square.range[1])] }
     }
 
-    /// The most, metres, by which a node's surface is off the samples, whatever its error is taken for, and the
-    /// most by which two samples in it differ.
+    /// Returns the maximum deviation of a node's surface from the samples, metres, and the maximum difference of two
+    /// samples in it, metres.
     pub fn deviation(&self, node: Node) -> [f32; 2] {
         let Square { error, range: [low, high] } = self.bounds.square(node.level, node.at);
-        // Rounded up, and nothing stays nothing.
+        // Rounded up; zero stays zero.
         let apart = (high - low) * (1.0 + f32::EPSILON);
         [if self.errors == Errors::Measured { error } else { apart }, apart]
     }
 
-    /// Length of the longer side of a cell, metres.
+    /// Returns the length of the longer side of a cell, metres.
     pub fn cell_m(&self, level: u32) -> f64 {
         self.spacing[0].max(self.spacing[1]) * f64::from(1u32 << level)
     }
 
-    /// The error of a square of a level in which `measured` was measured.
+    /// Returns the error of a square of a level, metres, given its measured error.
     #[inline]
     pub fn error(&self, level: u32, measured: f32) -> f32 {
         match &self.errors {

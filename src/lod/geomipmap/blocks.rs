@@ -1,5 +1,4 @@
-//! What is known of every block before any view: its heights' range and, for each level, how far its surface
-//! is from the samples.
+//! Precomputed height range of every block, and its error at each level, with a quadtree for culling.
 
 use rayon::prelude::*;
 
@@ -8,32 +7,32 @@ use crate::height::Field;
 use crate::height::progress::Progress;
 use crate::view::{Aabb, Containment, Frustum};
 
-/// All blocks of a field, and the quadtree over them.
+/// Blocks of a field, and the quadtree over them.
 pub struct Blocks {
-    /// Cells along a side of a block; the last ones may stick out of the field.
+    /// Cells along a side of a block. The last blocks may extend beyond the field.
     pub cells: i32,
-    /// Levels of a block, log2(cells) + 1.
+    /// Number of levels of a block, log2(cells) + 1.
     pub levels: u32,
-    /// Blocks along (x, z).
+    /// Number of blocks along (x, z).
     pub count: [u32; 2],
-    /// ε by block, then level, metres: saturated, and true for every border mask and, if blocks morph, for all
-    /// that is drawn on the way from the level before.
+    /// Error ε by block, then level, metres, never falling with the level. It holds for every border mask and, if
+    /// blocks morph, during the morph from the level before.
     errors: Vec<f32>,
-    /// Range of heights, from the blocks (level 0) up to one node; `None` where there is no land at all.
+    /// Height ranges from the blocks (level 0) up to one root; `None` where all samples are holes.
     ranges: Vec<BlockLevel>,
     spacing: [f64; 2],
     origin: [f64; 2],
     last: [u32; 2],
 }
 
-/// One level of the quadtree: each node covers 2 × 2 of the level below, fewer at the field's far edges.
+/// One level of the quadtree. A node covers 2 × 2 nodes of the level below, fewer at the field's far edges.
 struct BlockLevel {
     count: [u32; 2],
     ranges: Vec<Option<[f32; 2]>>,
 }
 
 impl Blocks {
-    /// Measures a field whose blocks morph, or do not.
+    /// Measures all blocks of a field, with the errors of morphs if `morph` is true.
     pub fn new(field: &Field, cells: i32, morph: bool, progress: &Progress) -> Self {
         let levels = cells.ilog2() + 1;
         let count = field.size().map(|n| (n - 1).div_ceil(cells as u32));
@@ -64,25 +63,25 @@ impl Blocks {
         }
     }
 
-    /// Whether a block sticks out of the field.
+    /// Returns true if a block extends beyond the field.
     pub fn is_partial(&self, block: usize) -> bool {
         let at = [block as u32 % self.count[0], block as u32 / self.count[0]];
         (0..2).any(|k| (at[k] + 1) * self.cells as u32 > self.last[k])
     }
 
-    /// ε of a block by level, metres.
+    /// Returns the error ε of a block by level, metres.
     pub fn errors(&self, block: usize) -> &[f32] {
         let levels = self.levels as usize;
         &self.errors[block * levels..(block + 1) * levels]
     }
 
-    /// The finest level that any block needs whatever the tolerance: the coarsest at which all of them are exact.
+    /// Returns the finest level that any block needs under any tolerance: the coarsest at which all of them are exact.
     pub fn finest(&self) -> u32 {
         let exact = |errors: &[f32]| errors.iter().skip(1).take_while(|&&error| error == 0.0).count() as u32;
         self.errors.chunks(self.levels as usize).map(exact).min().unwrap_or(0)
     }
 
-    /// The box around a block; a block without land has one of no height.
+    /// Returns the bounding box of a block, metres. One without data has height 0.
     pub fn bounds(&self, block: usize) -> Aabb {
         let (i, j) = (block as u32 % self.count[0], block as u32 / self.count[0]);
         self.node_bounds(0, i, j, self.ranges[0].ranges[block].unwrap_or_default())
@@ -95,7 +94,7 @@ impl Blocks {
         Aabb { min: corner(0, range[0]), max: corner(1, range[1]) }
     }
 
-    /// Calls `visit` for every block with land that may be seen.
+    /// Calls `visit` for every block with data whose box intersects the frustum.
     pub fn visit_visible(&self, frustum: &Frustum, visit: &mut impl FnMut(usize)) {
         self.descend(frustum, self.ranges.len() - 1, 0, 0, false, visit);
     }

@@ -1,58 +1,59 @@
-//! Which level a block takes in a view, and how neighbours are brought within one level of each other.
+//! Chooses the level of each block in a view, and brings neighbours within one level of each other.
 
 use super::MORPH_RATIO;
 use super::blocks::Blocks;
 use crate::view::View;
 
-/// How the level of a block is chosen.
+/// Rule for the level of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distance {
-    /// The coarsest level whose ε the view's tolerance and metric allow. With the paper metric this is
-    /// de Boer 2000, eq. 4: D = δ·v_res / (2·τ·tan(fov/2)).
+    /// The coarsest level whose ε the view's tolerance and metric allow. With the paper's metric this is de Boer 2000,
+    /// eq. 4: D = δ·v_res / (2·τ·tan(fov/2)).
     Error,
-    /// One level coarser every so many metres from the block's centre.
+    /// One level coarser per this distance from the block's centre, metres.
     Linear(f64),
-    /// One level coarser each time the distance doubles, from so many metres on.
+    /// One level coarser for each doubling of the distance, starting at this distance, metres.
     Exponential(f64),
 }
 
-/// One level as a fixed-point number: the fraction is the morph weight to the next level. Integers, so that sums
-/// are exact; 16 bits, so that weights are exact in f32 and their steps cannot be seen.
+/// One level as a fixed-point number; the fraction is the morph weight to the next level. Integers make sums exact;
+/// with 16 bits, weights are exact in f32 and their steps are invisible.
 pub const ONE: u32 = 1 << 16;
 
 impl Distance {
-    /// What must reach 1 before a block gives up `level − 1` for `level`. It falls with the level.
+    /// Returns the quantity that must reach 1 before a block uses `level` instead of `level − 1`. It falls with the
+    /// level.
     fn ratio(self, blocks: &Blocks, view: &View, block: usize) -> impl Fn(u32) -> f64 {
         let bounds = blocks.bounds(block);
         let distance = view.eye.distance((bounds.min + bounds.max) / 2.0);
         let allowed = view.allowed_error(&bounds);
         move |level| match self {
-            // Not 0 / 0.
+            // Avoids 0 / 0.
             Distance::Error => allowed / f64::from(blocks.errors(block)[level as usize].max(f32::MIN_POSITIVE)),
             Distance::Linear(base) => distance / base - f64::from(level - 1),
             Distance::Exponential(base) => distance / base / f64::from(1u32 << (level - 1)),
         }
     }
 
-    /// From which to which ratio a block morphs.
+    /// Returns the ratios between which a block morphs.
     fn band(self) -> [f64; 2] {
         match self {
             Distance::Error => [1.0, MORPH_RATIO],
-            // The last 30 % of the way between two levels; exponential ones begin at half the ratio.
+            // The last 30 % of the distance between two levels; exponential levels begin at half the ratio.
             Distance::Linear(_) => [0.7, 1.0],
             Distance::Exponential(_) => [0.85, 1.0],
         }
     }
 
-    /// Whole levels: those whose ratio is reached.
+    /// Returns the coarsest whole level whose ratio reaches 1.
     fn level(self, blocks: &Blocks, view: &View, block: usize) -> u32 {
         let ratio = self.ratio(blocks, view, block);
         ONE * (1..blocks.levels).take_while(|&level| ratio(level) >= 1.0).count() as u32
     }
 
-    /// The sum of what each level has of its band: continuous, however the bands overlap. As the ratio falls
-    /// with the level, the sum exceeds a level only where the band of the next one has begun, and with it the
-    /// bound is kept.
+    /// Returns the continuous level: the sum over levels of the part of each band that is passed. It is continuous even
+    /// if bands overlap. As the ratio falls with the level, the sum exceeds a level only if the next one's band has
+    /// begun, where the error bound holds.
     fn morphing_level(self, blocks: &Blocks, view: &View, block: usize) -> u32 {
         let ratio = self.ratio(blocks, view, block);
         let [begin, end] = self.band();
@@ -61,7 +62,7 @@ impl Distance {
         (sum * f64::from(ONE)) as u32
     }
 
-    /// The fixed-point level of every block, neighbours within one level of each other.
+    /// Computes the fixed-point level of every block, with neighbours within one level of each other.
     pub fn levels(self, blocks: &Blocks, view: &View, morph: bool, levels: &mut Vec<u32>) {
         let [w, h] = blocks.count.map(|n| n as usize);
         let level = if morph { Self::morphing_level } else { Self::level };
@@ -71,8 +72,8 @@ impl Distance {
     }
 }
 
-/// Refines levels until neighbours differ by at most one: two sweeps give each block the smallest of
-/// (level + distance in blocks) over all others. That is continuous in all of them, and so are morph weights.
+/// Refines levels until neighbours differ by at most one. Two sweeps give each block the minimum of (level + distance
+/// in blocks) over all blocks. This is continuous in all of them, and so are morph weights.
 pub fn restrict(levels: &mut [u32], w: usize, h: usize) {
     for k in 0..w * h {
         let (i, j) = (k % w, k / w);

@@ -1,25 +1,26 @@
-//! How far the shapes of a block are from the samples.
+//! Measures the distance of a block's surface from the samples, at each level and while it morphs.
 //!
-//! A block that morphs from level l to l + 1 has a weight v inside and one on each side, e, which goes from 0
-//! (level l) over 1 (level l + 1) to 2 (level l + 2). A vertex moves on a straight line with the one weight it
-//! depends on, or, inside next to a side, with v and with the e of the sides that its target's ends lie on. So
-//! above any sample the drawn height is affine in each weight while the others stay, between whole numbers, and
-//! the largest distance from the sample is at a corner of that cube: v in {0, 1}, each e in {0, 1, 2}. The
-//! corners are shapes, and the shapes are measured. As a triangle depends on one side only (at a block's corners
-//! too, where cells have their diagonals from that corner, at both levels), all sides are measured at the same e.
-//! Most corners are what a level draws anyway, stitched or not; new are v = 0 with e = 2, level l inside and two
-//! levels coarser on the sides, and v = 1 with e = 0, level l + 1 inside and level l on the sides.
+//! A block that morphs from level l to l + 1 has a weight v inside and a weight e on each side. e is 0 at level l, 1 at
+//! level l + 1 and 2 at level l + 2. A vertex moves on a straight line with the one weight it depends on. Inside next
+//! to a side, it moves with v and with the e of the sides that contain the ends of its target. The drawn height at a
+//! sample is therefore affine in each weight between whole numbers. The largest distance is at a corner of that cube: v
+//! in {0, 1}, each e in {0, 1, 2}. Each corner is a fixed shape, and these shapes are measured.
+//!
+//! A triangle depends on one side only, also at a block's corners, where cells have their diagonals from that corner at
+//! both levels. All sides are therefore measured at the same e. Most corners of the cube are shapes that a level draws
+//! anyway, stitched or not. Two are new. v = 0 with e = 2 is level l inside and two levels coarser on the sides. v = 1
+//! with e = 0 is level l + 1 inside and level l on the sides.
 
 use super::mesh;
 use crate::draw::Instance;
 use crate::draw::layout::Frame;
 use crate::draw::place::{lattice_height, lattice_position, turned_position};
-use crate::draw::weights::{self, ONE};
+use crate::draw::weights::{ONE, SlotWeights};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle};
 
-/// Heights between two shapes are rounded: a drawn height is off by at most 12 half-ulps of the largest height
-/// around, six for each of the two steps of `draw::place::lattice_height`.
+/// Rounding bound of morphed heights, relative to the largest height: at most 12 half-ulps, six for each of the two
+/// steps of `draw::place::lattice_height`.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// Triangles of a block at a level and at whole morph weights.
@@ -31,38 +32,38 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// All that a block may draw at a level, and on the way to it from the one before if it morphs, as far as it
-    /// may be off the samples.
+    /// Returns all shapes that a block may draw at a level, and during the morph to it from the one before, that may
+    /// deviate from the samples.
     pub fn up_to(cells: i32, level: u32, morph: bool) -> Vec<Shape> {
         let still = Shape { level, morph: 0, edge_morph: [0; 4], triangles: pattern(cells, level) };
-        let way = if morph && level > 0 { Self::on_the_way(cells, level - 1) } else { Vec::new() };
-        std::iter::once(still).chain(way).collect()
+        let morphing = if morph && level > 0 { Self::during_morph(cells, level - 1) } else { Vec::new() };
+        std::iter::once(still).chain(morphing).collect()
     }
 
-    /// The new corners of the module's text from `level` to the next.
-    fn on_the_way(cells: i32, level: u32) -> Vec<Shape> {
+    /// Returns the new corners described in the module's text, from `level` to the next.
+    fn during_morph(cells: i32, level: u32) -> Vec<Shape> {
         let n = cells >> level;
         let shape = |(morph, side): (u32, u32)| {
             let mask = if side < ONE { 0 } else { 15 };
             let triangles = [mesh::border(n, mask), mesh::inner_border(n)].concat();
             Shape { level, morph, edge_morph: [side; 4], triangles }
         };
-        // No level is two levels coarser than that of two cells.
+        // Levels of two cells and fewer have no level two levels coarser.
         let corners = [(ONE, 0), (0, 2 * ONE)].into_iter().filter(|(_, side)| *side < 2 * ONE || n > 2);
         corners.map(shape).collect()
     }
 }
 
-/// Every triangle that a block may draw at a level and that may be off the samples, whatever its mask: a border
-/// triangle depends on one side only, so the masks with no side and with all sides have them all. At the finest
-/// level only stitched borders are off.
+/// Returns every triangle that a block may draw at a level and that may deviate from the samples, for any mask. A
+/// border triangle depends on one side only, so the masks with no side and with all sides contain them all. At the
+/// finest level only stitched borders deviate.
 fn pattern(cells: i32, level: u32) -> Vec<[[i32; 2]; 3]> {
     let n = cells >> level;
     let stitched = if n > 1 { mesh::border(n, 15) } else { Vec::new() };
     if level == 0 { stitched } else { [mesh::centre(n), mesh::border(n, 0), stitched].concat() }
 }
 
-/// One block while it is measured.
+/// A block to measure.
 pub struct Block<'a> {
     field: &'a Field,
     frame: Frame,
@@ -71,24 +72,24 @@ pub struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// The block at a place among the blocks.
+    /// Creates the block at a place among the blocks.
     pub fn new(field: &'a Field, cells: i32, at: [i32; 2]) -> Self {
         let last = field.size().map(|n| n as i32 - 1);
-        Self { field, frame: Frame { last, ..Frame::default() }, cells, at }
+        Self { field, frame: Frame::of_lattice(last), cells, at }
     }
 
-    /// First and last sample.
+    /// Returns the first and the last sample.
     fn ends(&self) -> [[i32; 2]; 2] {
         let first = self.at.map(|n| n * self.cells);
-        [first, [0, 1].map(|k| (first[k] + self.cells).min(self.frame.last[k]))]
+        [first, [0, 1].map(|k| (first[k] + self.cells).min(self.frame.heights.last[k]))]
     }
 
-    /// Whether it sticks out of the field.
+    /// Returns true if the block extends beyond the field.
     fn is_partial(&self) -> bool {
-        (0..2).any(|k| (self.at[k] + 1) * self.cells > self.frame.last[k])
+        (0..2).any(|k| (self.at[k] + 1) * self.cells > self.frame.heights.last[k])
     }
 
-    /// Range of all heights, those under holes included.
+    /// Returns the range of all heights, including those of holes, metres.
     fn range(&self) -> [f32; 2] {
         let [first, last] = self.ends();
         let rows = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| (i, j)));
@@ -98,13 +99,13 @@ impl<'a> Block<'a> {
         })
     }
 
-    /// The range, or `None` if no triangle of the finest level has data at its three corners.
+    /// Returns the range of heights, metres; `None` if no triangle of the finest level has data at its three corners.
     pub fn range_of_terrain(&self) -> Option<[f32; 2]> {
         let [first, last] = self.ends();
         surface::has_terrain(self.field, first, last).then(|| self.range())
     }
 
-    /// ε by level, saturated.
+    /// Returns the error ε by level, metres, never falling with the level.
     pub fn errors(&self, shapes: &[Vec<Shape>]) -> Vec<f32> {
         let mut saturated = 0.0f32;
         let error = |shapes: &Vec<Shape>| {
@@ -115,40 +116,41 @@ impl<'a> Block<'a> {
         if shapes.iter().any(|shapes| shapes.len() > 1) {
             let [low, high] = self.range();
             let rounding = low.abs().max(high.abs()) * ROUNDING;
-            // Where nothing is off the samples, nothing moves.
+            // A level without error does not move at all.
             errors.iter_mut().filter(|error| **error > 0.0).for_each(|error| *error += rounding);
         }
         errors
     }
 
     fn error(&self, shape: &Shape) -> f32 {
-        // The inside of a block that sticks out does not morph.
+        // The inside of a block that extends beyond the field does not morph.
         if shape.morph > 0 && self.is_partial() {
             return 0.0;
         }
         let instance = Instance {
             origin: self.at.map(|n| n * self.cells),
             cells: self.cells as u32,
-            rotation: coarsest_turn(self.at, self.cells >> shape.level),
+            rotation: single_cell_rotation(self.at, self.cells >> shape.level),
             level: shape.level,
-            weights: weights::uniform(shape.morph, shape.edge_morph),
             ..Instance::default()
         };
-        shape.triangles.iter().map(|t| self.deviation(&instance, t)).fold(0.0, f32::max)
+        let weights = SlotWeights::uniform(shape.morph, shape.edge_morph);
+
+        shape.triangles.iter().map(|t| self.deviation(&instance, &weights, t)).fold(0.0, f32::max)
     }
 
-    fn deviation(&self, instance: &Instance, triangle: &[[i32; 2]; 3]) -> f32 {
+    fn deviation(&self, instance: &Instance, weights: &SlotWeights, triangle: &[[i32; 2]; 3]) -> f32 {
         let corners: Triangle = triangle.map(|at| {
             let turned = turned_position(instance, at.map(|n| n << instance.level));
             let [x, z] = lattice_position(&self.frame, instance, turned);
-            Corner { x, z, y: lattice_height(self.field, &self.frame, instance, turned) }
+            Corner { x, z, y: lattice_height(self.field, &self.frame, instance, weights, turned) }
         });
         if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(self.field, &corners) }
     }
 }
 
-/// A block of a single cell takes its diagonal from its own parity among the blocks.
-pub fn coarsest_turn(at: [i32; 2], n: i32) -> u32 {
+/// Returns the quarter turns of a block of a single cell: its diagonal depends on its own parity among the blocks.
+pub fn single_cell_rotation(at: [i32; 2], n: i32) -> u32 {
     u32::from(n == 1 && (at[0] + at[1]) & 1 == 1)
 }
 
@@ -159,7 +161,7 @@ mod tests {
 
     const CELLS: i32 = 16;
 
-    /// 2 × 2 blocks, rough only near a column of samples, or near one sample.
+    /// Returns a field of 2 × 2 blocks that is rough only near a column of samples, or near one sample.
     fn rough_near(x: u32, z: Option<u32>, random: &mut impl FnMut() -> f32) -> Field {
         let size = 2 * CELLS as u32 + 1;
         let near = |k: u32| (k % size).abs_diff(x) < 3 && z.is_none_or(|z| (k / size).abs_diff(z) < 3);
@@ -167,7 +169,7 @@ mod tests {
         Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
     }
 
-    /// ε of everything a block draws at given weights.
+    /// Returns the error of everything a block draws at these weights.
     fn drawn_error(block: &Block, level: u32, morph: u32, edge_morph: [u32; 4]) -> f32 {
         let (n, mask) = (CELLS >> level, (0..4).filter(|&k| edge_morph[k] >= ONE).map(|k| 1 << k).sum());
         let triangles = [mesh::border(n, mask), mesh::centre(n)].concat();
@@ -175,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn no_weights_between_the_corners_exceed_the_error() {
+    fn morph_error_stays_within_the_bound() {
         let mut seed = 3u32;
         let mut random = || {
             seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
@@ -203,7 +205,7 @@ mod tests {
                 closest = closest.max(error / bound.max(f32::MIN_POSITIVE));
             }
         }
-        // The shapes on the way are needed, and no more than needed.
+        // The shapes during morphs are necessary, and the bound is tight.
         assert!(beyond_still > 10 && closest > 0.999, "{beyond_still} beyond what levels draw, {closest} of the bound");
     }
 }

@@ -1,5 +1,5 @@
-//! The flat mesh of a block: one grid of vertices, and for each level the indices of its centre and, for
-//! each border mask, of its border.
+//! Builds the flat mesh of a block: one grid of vertices, and for each level the indices of its centre and of its
+//! border for each border mask.
 
 use std::ops::Range;
 
@@ -18,28 +18,28 @@ pub mod side {
     pub const BOTTOM: u8 = 8;
 }
 
-/// The six masks that give all sixteen by quarter turns: no side, one, two adjacent, two opposite, three,
-/// four. By Burnside's lemma (16 + 2 + 4 + 2) / 4 = 6.
+/// The six masks from which quarter turns make all sixteen: no side, one, two adjacent, two opposite, three, four. By
+/// Burnside's lemma (16 + 2 + 4 + 2) / 4 = 6.
 pub const CLASSES: [u8; 6] = [0b0000, 0b0001, 0b0011, 0b0101, 0b0111, 0b1111];
 
-/// A quarter turn maps left to top, top to right, right to bottom, bottom to left: one bit to the next.
-fn turned(mask: u8, rotation: u32) -> u8 {
+/// Rotates a mask by quarter turns, each of which maps left to top, top to right, right to bottom, bottom to left.
+fn rotated(mask: u8, rotation: u32) -> u8 {
     ((mask << rotation) | (mask >> (4 - rotation))) & 15
 }
 
-/// Class and quarter turns (0–3) that give a mask.
+/// Returns the class and the number of quarter turns (0–3) that give a mask.
 pub fn class_of(mask: u8) -> (usize, u32) {
     let find =
-        |rotation| CLASSES.iter().position(|&class| turned(class, rotation) == mask).map(|class| (class, rotation));
-    (0..4).find_map(find).expect("six classes and their turns cover all masks")
+        |rotation| CLASSES.iter().position(|&class| rotated(class, rotation) == mask).map(|class| (class, rotation));
+    (0..4).find_map(find).expect("six classes and their rotations cover all masks")
 }
 
-/// Which border masks have indices of their own.
+/// Border masks for which indices are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Masks {
     /// All sixteen, as published.
     Sixteen,
-    /// The six of [`CLASSES`], turned per instance.
+    /// The six of [`CLASSES`], rotated per instance.
     Six,
 }
 
@@ -51,7 +51,7 @@ impl Masks {
         }
     }
 
-    /// Which of the borders to draw for a mask, and how often to turn it.
+    /// Returns the index of the border for a mask, and its number of quarter turns.
     pub fn border(self, mask: u8) -> (usize, u32) {
         match self {
             Masks::Sixteen => (usize::from(mask), 0),
@@ -59,29 +59,29 @@ impl Masks {
         }
     }
 
-    /// How many borders a level has.
+    /// Returns the number of borders of a level.
     pub fn count(self) -> usize {
         self.list().len()
     }
 }
 
-/// The mesh with its index ranges.
+/// Mesh of a block with its index ranges.
 pub struct BlockMesh {
-    /// (cells + 1)² vertices; borders of every level first, then centres of every level.
+    /// (cells + 1)² vertices; indices of the borders of every level first, then of the centres.
     pub geometry: Geometry,
-    /// By level, then mask or class.
+    /// Index ranges by level, then mask or class.
     pub borders: Vec<Vec<Range<u32>>>,
-    /// By level; empty where a level is all border.
+    /// Index ranges by level; empty if a level is all border.
     pub centres: Vec<Range<u32>>,
 }
 
 impl BlockMesh {
-    /// A block of `cells` (a power of two) cells a side with log2(cells) + 1 levels, all of them used.
+    /// Builds a block of `cells` (a power of two) cells a side with all of its log2(cells) + 1 levels.
     pub fn new(cells: i32, masks: Masks) -> Self {
         Self::used(cells, masks, 0, false)
     }
 
-    /// The same without indices for levels finer than `finest` and, if the block is `alone`, for sides that meet others.
+    /// Builds a block without indices for levels finer than `finest` and, if it is `alone`, for sides that meet others.
     pub fn used(cells: i32, masks: Masks, finest: u32, alone: bool) -> Self {
         let levels = cells.ilog2() + 1;
         let positions = (0..=cells).flat_map(|z| (0..=cells).map(move |x| [x, z]));
@@ -104,24 +104,24 @@ impl BlockMesh {
     }
 }
 
-/// Whether cell `(i, j)` of `n` × `n` touches a side.
+/// Returns true if cell `(i, j)` of `n` × `n` touches a side.
 fn on_border(i: i32, j: i32, n: i32) -> bool {
     i == 0 || j == 0 || i == n - 1 || j == n - 1
 }
 
-/// Triangles of all cells off the border.
+/// Returns the triangles of all cells off the border.
 pub fn centre(n: i32) -> Vec<[[i32; 2]; 3]> {
     cells(n).filter(|&(i, j)| !on_border(i, j, n)).flat_map(|(i, j)| rtin::cell(i, j)).collect()
 }
 
-/// Triangles of the cells next to the border cells.
+/// Returns the triangles of the cells next to the border cells.
 pub fn inner_border(n: i32) -> Vec<[[i32; 2]; 3]> {
     let next = |(i, j): &(i32, i32)| (1..n - 1).contains(i) && (1..n - 1).contains(j) && on_border(i - 1, j - 1, n - 2);
     cells(n).filter(next).flat_map(|(i, j)| rtin::cell(i, j)).collect()
 }
 
-/// Triangles of the border cells: on a side of the mask every second vertex falls onto the one before it,
-/// and what collapses is dropped.
+/// Returns the triangles of the border cells. On a side of the mask every second vertex snaps to the one before it, and
+/// collapsed triangles are dropped.
 pub fn border(n: i32, mask: u8) -> Vec<[[i32; 2]; 3]> {
     let snap = |[x, z]: [i32; 2]| {
         let on = |bit: u8, at: bool| mask & bit != 0 && at;
@@ -151,19 +151,19 @@ mod tests {
     use std::collections::BTreeSet;
 
     fn set(triangles: impl IntoIterator<Item = [[i32; 2]; 3]>) -> BTreeSet<[[i32; 2]; 3]> {
-        // Corners in cyclic order from the smallest: the winding counts.
+        // Corners in cyclic order from the smallest, which keeps the winding.
         triangles.into_iter().map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()).collect()
     }
 
-    /// The proof by enumeration that six classes and quarter turns draw what sixteen masks draw.
+    /// Proves by enumeration that six classes with quarter turns draw what sixteen masks draw.
     #[test]
-    fn six_turned_classes_are_the_sixteen_masks() {
+    fn six_rotated_classes_cover_all_masks() {
         for n in [2, 4, 8, 16, 32, 64, 128, 256] {
             for mask in 0..16 {
                 let (class, rotation) = class_of(mask);
                 let turn = |[x, z]: [i32; 2]| [[x, z], [n - z, x], [n - x, n - z], [z, n - x]][rotation as usize];
-                let turned = border(n, CLASSES[class]).into_iter().map(|t| t.map(turn));
-                assert_eq!(set(turned), set(border(n, mask)), "n {n}, mask {mask:04b}");
+                let rotated = border(n, CLASSES[class]).into_iter().map(|t| t.map(turn));
+                assert_eq!(set(rotated), set(border(n, mask)), "n {n}, mask {mask:04b}");
             }
             let quarter = centre(n).into_iter().map(|t| t.map(|[x, z]| [n - z, x]));
             assert_eq!(set(quarter), set(centre(n)));

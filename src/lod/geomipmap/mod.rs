@@ -1,21 +1,22 @@
-//! GeoMipMapping with the heights found in the vertex program.
+//! GeoMipMapping: blocks of one flat mesh that the vertex shader displaces by the height texture.
 //!
-//! After W. H. de Boer, "Fast terrain rendering using geometrical mipmapping" (2000), and A. Tabaković,
-//! "3D Terrain with Level of Detail" (ATLOD, 2023): blocks of 2^n + 1 vertices, one flat mesh for all of them,
-//! its indices held per level as a centre and, per border mask, a border.
+//! Based on W. H. de Boer, "Fast terrain rendering using geometrical mipmapping" (2000), and A. Tabaković, "3D Terrain
+//! with Level of Detail" (ATLOD, 2023). Blocks have (2^n + 1)² vertices and share one flat mesh. Its indices are stored
+//! per level as a centre and, per border mask, a border.
 //!
-//! Where this differs from ATLOD, and why:
-//! - level 0 is the finest, as everywhere here;
-//! - neighbours are brought within one level by propagation: by distance alone they are not, on steep land;
-//! - partial blocks at the far edges are drawn, not dropped: what sticks out collapses onto the edge;
-//! - the six border classes of its outlook are the default, its sixteen masks an option; so are its levels by
-//!   distance beside levels by error;
-//! - with `morph=on` its outlook's vertex morphing too: levels are continuous numbers (see [`levels`]), a side
-//!   has the greater of its two blocks', and vertices that the next level lacks go to their places in it;
-//! - blocks are culled by a quadtree and drawn instanced, all in one indirect call; `draw-per-block` records
-//!   its two draws for each block.
+//! Differences from ATLOD:
+//! - Level 0 is the finest, as everywhere in this crate.
+//! - Neighbours are brought within one level by propagation. Distance alone does not ensure that on steep terrain.
+//! - Partial blocks at the far edges are drawn, not dropped. Vertices beyond the field collapse onto its edge.
+//! - The six border classes of its outlook are the default, its sixteen masks an option. Its levels by distance exist
+//!   beside levels by error.
+//! - `morph=on` adds the vertex morphing of its outlook. Levels are continuous numbers (see [`levels`]), and a side has
+//!   the coarser level of its two blocks. Vertices that the next level lacks move to their places in it.
+//! - Blocks are culled by a quadtree and drawn instanced in one indirect call. The variant `draw-per-block` records two
+//!   draws for each block.
 //!
-//! Laws kept: watertight, covered once, error within tolerance (`distance=error`), no state between views.
+//! Invariants: watertight; the field is covered once; error within tolerance (`distance=error`); no state between
+//! views.
 
 pub mod blocks;
 pub mod levels;
@@ -27,23 +28,24 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
+use super::{Diagnostics, Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
 use crate::draw::{
-    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology, weights,
+    Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
-/// A morphing block begins to leave a level where the allowed error reaches that of the way to the next one, and
-/// has left it at this many times that error: a longer way draws the finer level for longer, a shorter one is seen.
+/// End of the morph band: a block starts to morph where the allowed error reaches that of the morph to the next level,
+/// and has morphed at this multiple of it. A wider band draws finer levels for longer, a narrower one is noticeable.
 const MORPH_RATIO: f64 = 1.3;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "geomipmap",
-    about: "blocks of one flat mesh, level by error or distance, borders stitched by index",
+    about: "blocks of one flat mesh, level by error or distance, borders stitched by their indices",
     paper: "de Boer 2000; Tabaković 2023 (ATLOD)",
-    variants: &[Variant { name: "draw-per-block", about: "two recorded draws a block, as published" }],
+    variants: &[Variant { name: "draw-per-block", about: "two recorded draws per block, as published" }],
     settings: &[
         Setting {
             key: "block",
@@ -55,7 +57,7 @@ pub const ENTRY: Entry = Entry {
             key: "distance",
             values: Values::Words(&["error", "linear", "exponential"]),
             default: "error",
-            about: "what sets a block's level: the tolerance, or its centre's distance",
+            about: "level of a block: by its error and the tolerance, or by its centre's distance",
         },
         Setting {
             key: "base",
@@ -67,13 +69,13 @@ pub const ENTRY: Entry = Entry {
             key: "masks",
             values: Values::Words(&["6", "16"]),
             default: "6",
-            about: "border masks held: six turned classes, or all sixteen",
+            about: "stored border masks: six classes and their rotations, or all sixteen",
         },
         Setting {
             key: "morph",
             values: Values::Words(&["off", "on"]),
             default: "off",
-            about: "whether a level goes over into the next, or changes at once",
+            about: "on: levels morph into each other; off: they change at once",
         },
     ],
     needs: &[Need { key: "base", other: "distance", words: &["linear", "exponential"] }],
@@ -86,7 +88,7 @@ pub const ENTRY: Entry = Entry {
 struct GeoMipMap {
     blocks: Blocks,
     mesh: BlockMesh,
-    /// The finest level that is ever drawn.
+    /// Finest level that is ever drawn.
     finest: u32,
     masks: Masks,
     distance: Distance,
@@ -96,7 +98,7 @@ struct GeoMipMap {
     index_bytes: [usize; 2],
     /// Level of every block in the current view, fixed-point.
     levels: Vec<u32>,
-    /// The blocks in sight, with the key that sorts them into draws.
+    /// Visible blocks, with the key that sorts them into draws.
     visible: Vec<(u32, u32)>,
 }
 
@@ -128,12 +130,12 @@ impl GeoMipMap {
         }
     }
 
-    /// The whole level that a block is drawn at.
+    /// Returns the whole level at which a block is drawn.
     fn level(&self, block: usize) -> u32 {
         self.levels[block] / ONE
     }
 
-    /// The blocks to the left, top, right and bottom; at the field's border the block itself.
+    /// Returns the blocks to the left, top, right and bottom; at the field's border the block itself.
     fn neighbours(&self, block: usize) -> [usize; 4] {
         let [w, h] = self.blocks.count.map(|n| n as usize);
         let (i, j) = (block % w, block / w);
@@ -146,17 +148,17 @@ impl GeoMipMap {
         ]
     }
 
-    /// The sides on which a block meets a coarser one.
+    /// Returns the sides on which a block meets a coarser one, as bits.
     fn mask(&self, block: usize) -> u8 {
         let bits = self.neighbours(block).into_iter().zip([side::LEFT, side::TOP, side::RIGHT, side::BOTTOM]);
         bits.filter(|&(neighbour, _)| self.level(neighbour) > self.level(block)).map(|(_, bit)| bit).sum()
     }
 
-    /// How far beyond a block's level its inside and its sides are. A side has the greater level of its two
-    /// blocks: it is where either of them goes over, and the other one's bound covers it, being at most a level
-    /// behind. Where blocks stick out of the field midpoints are none, so the inside of such a block and a side
-    /// between two of them stay.
-    fn weights(&self, block: usize) -> [u32; 4] {
+    /// Returns the morph weights of a block's inside and sides, relative to its whole level. A side has the coarser
+    /// level of its two blocks; the other block is at most one level finer, so its error bound covers it. The inside of
+    /// a block that extends beyond the field does not morph, because midpoints are not vertices there. Nor does a side
+    /// between two such blocks.
+    fn weights(&self, block: usize) -> SlotWeights {
         let base = self.level(block) * ONE;
         let partial = |block| self.blocks.is_partial(block);
         let weight = |level: u32, stays: bool| {
@@ -164,7 +166,7 @@ impl GeoMipMap {
             (level - base) / (ONE / weights::ONE)
         };
         let edge = |other: usize| weight(self.levels[block].max(self.levels[other]), partial(block) && partial(other));
-        weights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
+        SlotWeights::uniform(weight(self.levels[block], partial(block)), self.neighbours(block).map(edge))
     }
 
     fn instance(&self, block: usize) -> Instance {
@@ -172,18 +174,17 @@ impl GeoMipMap {
         let level = self.level(block);
         let (_, rotation) = self.masks.border(self.mask(block));
         let at = [i as i32, j as i32];
-        Instance {
+        let instance = Instance {
             origin: at.map(|n| n * self.blocks.cells),
             cells: self.blocks.cells as u32,
-            shift: 0,
-            rotation: rotation.max(measure::coarsest_turn(at, self.blocks.cells >> level)),
+            rotation: rotation.max(measure::single_cell_rotation(at, self.blocks.cells >> level)),
             level,
-            batch: 0,
-            weights: if self.morph { self.weights(block) } else { [0; 4] },
-        }
+            ..Instance::default()
+        };
+        if self.morph { instance.with_weights(self.weights(block)) } else { instance }
     }
 
-    /// Sorts what is visible into runs of the same level and border and appends their instances.
+    /// Sorts the visible blocks into runs of the same level and border and appends their instances.
     fn fill_instances(&mut self, view: &View, list: &mut DrawList) {
         let mut visible = std::mem::take(&mut self.visible);
         visible.clear();
@@ -197,7 +198,7 @@ impl GeoMipMap {
         self.visible = visible;
     }
 
-    /// One draw for the borders of each level and mask, one for the centres of each level.
+    /// Appends one draw for the borders of each level and mask, and one for the centres of each level.
     fn draw_instanced(&self, list: &mut DrawList) {
         let masks = self.masks.count() as u32;
         let mut first = 0u32;
@@ -215,7 +216,7 @@ impl GeoMipMap {
         }
     }
 
-    /// The published way: centre and border of each block are a draw of their own.
+    /// Appends two draws per block, its centre and its border, as published.
     fn draw_per_block(&self, list: &mut DrawList) {
         let masks = self.masks.count() as u32;
         list.submission = Submission::Direct;
@@ -277,6 +278,12 @@ impl Technique for GeoMipMap {
         }
     }
 
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Diagnostics for GeoMipMap {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             let mesh = BlockMesh::used(self.blocks.cells, self.masks, finest, alone);

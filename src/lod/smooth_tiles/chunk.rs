@@ -1,22 +1,23 @@
-//! What a tile keeps on the device at a level: each vertex with its height and where it goes.
+//! Builds the vertices of a tile at a level, each with its height and its morph targets.
 //!
-//! A vertex that the next level lacks goes to the middle of the edge of that level on which it lies (Larsen &
-//! Christensen, table 3); inside with the tile's weight, on a side with the side's. A side's weight goes on to the
-//! level after the next, for it may meet a tile that is on its way there: then the even vertices of the side go to the
-//! middle of that level's edges, and with them the targets of the vertices inside whose edges end there. So one chunk
-//! serves whatever the neighbours do, and where their levels change only indices do.
+//! A vertex that the next level lacks morphs to the middle of that level's edge on which it lies (Larsen & Christensen,
+//! table 3). Inside, it uses the tile's weight; on a side, the side's. A side's weight may exceed one level, because
+//! the tile beyond may already be morphing to the level after the next. Even vertices of the side then move to the
+//! middle of that level's edges. Targets of inside vertices whose edges end on the side move with them. One chunk
+//! therefore fits all levels of neighbours; only its indices change.
 
 use glam::Vec3;
 
 use super::pattern;
-use crate::draw::weights::{self, Slot};
+use crate::draw::layout::{FIRST_SIDE, LAST_SIDE};
+use crate::draw::weights::Slot;
 use crate::draw::{ExplicitVertex, VertexNormals, normals};
 use crate::height::Field;
 
-/// The place of a tile among the samples.
+/// Place of a tile among the samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Its first sample.
+    /// First sample, (x, z).
     pub origin: [i32; 2],
     /// Cells along a side.
     pub cells: i32,
@@ -31,17 +32,17 @@ struct ChunkLevel<'a> {
     n: i32,
 }
 
-/// Vertices of a chunk of a level.
+/// Returns the number of vertices of a chunk of a level.
 pub fn vertices(cells: i32, level: u32) -> usize {
     ((cells >> level) as usize + 1).pow(2)
 }
 
-/// The slot of a side's weight: that of its first half, both being the same.
+/// Returns the slot of a side's weight. Both halves of a side have the same weight; this is the first one's.
 fn side_slot(side: usize) -> Slot {
-    (1 + side / 2, 2 * (side as u32 % 2))
+    Slot { line: if side < 2 { FIRST_SIDE } else { LAST_SIDE }, byte: 2 * (side as u32 % 2) }
 }
 
-/// The vertices of a tile at a level, row by row.
+/// Builds the vertices of a tile at a level, row by row.
 pub fn build(field: &Field, place: Place, level: u32) -> Vec<ExplicitVertex> {
     let tile = ChunkLevel { field, place, level, n: place.cells >> level };
     let vertex = |at: [i32; 2]| {
@@ -52,7 +53,7 @@ pub fn build(field: &Field, place: Place, level: u32) -> Vec<ExplicitVertex> {
     tile.vertices().map(vertex).collect()
 }
 
-/// Their normals, which go over as their heights do.
+/// Builds the normals of the same vertices. They morph by the same weights as heights.
 pub fn build_normals(field: &Field, place: Place, level: u32) -> Vec<VertexNormals> {
     let tile = ChunkLevel { field, place, level, n: place.cells >> level };
     let normals = |at: [i32; 2]| {
@@ -62,9 +63,9 @@ pub fn build_normals(field: &Field, place: Place, level: u32) -> Vec<VertexNorma
     tile.vertices().map(normals).collect()
 }
 
-/// What a vertex takes along.
+/// A vertex attribute that morphs.
 trait Value: Copy {
-    /// That in the middle of an edge between two of it.
+    /// Returns the value at the middle of an edge between two vertices.
     fn middle(self, other: Self) -> Self;
 }
 
@@ -74,7 +75,7 @@ impl Value for f32 {
     }
 }
 
-/// A unit normal.
+/// Unit normals.
 impl Value for Vec3 {
     fn middle(self, other: Vec3) -> Vec3 {
         (self + other).try_normalize().unwrap_or(Vec3::Y)
@@ -87,7 +88,7 @@ impl ChunkLevel<'_> {
         (0..=n).flat_map(move |z| (0..=n).map(move |x| [x, z]))
     }
 
-    /// What a vertex has, where it goes, and where its target goes itself, given what each vertex has.
+    /// Returns a vertex's value, its target, and the target of that target, given the value at each vertex.
     fn values<V: Value>(&self, at: [i32; 2], value: &impl Fn([i32; 2]) -> V) -> [V; 3] {
         let own = value(at);
         if let Some(side) = pattern::side(self.n, at) {
@@ -103,26 +104,27 @@ impl ChunkLevel<'_> {
         [own, middle(at, apart, value), before.middle(after)]
     }
 
-    /// Whose weights a vertex and its target go by.
+    /// Returns the weight slots by which a vertex and its target morph.
     fn regions(&self, at: [i32; 2]) -> u32 {
         if let Some(side) = pattern::side(self.n, at) {
             let is_odd = at[1 - side % 2] & 1 == 1;
-            return weights::region(side_slot(side), u32::from(!is_odd));
+            return side_slot(side).region(u32::from(!is_odd));
         }
         if !self.moves_inside(at) {
             return 0;
         }
         let side = ends(at, self.half_edge(at)).into_iter().find_map(|end| pattern::side(self.n, end));
-        let second = side.map_or(0, |side| weights::region(side_slot(side), 1));
-        weights::region(weights::inside(0), 0) | second << 8
+        let second = side.map_or(0, |side| side_slot(side).region(1));
+        Slot::inside(0).region(0) | second << 8
     }
 
-    /// Whether a vertex lies inside and the next level lacks it.
+    /// Returns true if a vertex lies inside and the next level lacks it.
     fn moves_inside(&self, at: [i32; 2]) -> bool {
         self.half_edge(at) != [0, 0] && at.iter().all(|&n| n > 0 && n < self.n)
     }
 
-    /// What a vertex of the next level has when its side, if it lies on one, has gone on to the level after that.
+    /// Returns the value of a vertex of the next level after its side, if it lies on one, has morphed one level
+    /// further.
     fn side_target<V: Value>(&self, at: [i32; 2], value: &impl Fn([i32; 2]) -> V) -> V {
         match pattern::side(self.n, at) {
             Some(side) if at[1 - side % 2] & 2 != 0 => middle(at, along(side, 2), value),
@@ -130,11 +132,12 @@ impl ChunkLevel<'_> {
         }
     }
 
-    /// From a vertex to one end of the edge of the next level in whose middle it lies; nothing if that level has it.
+    /// Returns the step from a vertex to one end of the next level's edge in whose middle it lies; zero if that level
+    /// has the vertex.
     fn half_edge(&self, at: [i32; 2]) -> [i32; 2] {
         let mut apart = at.map(|n| n & 1);
         if apart == [1, 1] {
-            // The diagonal of the coarser cell: it turns with the parity of the cell's place in the whole field.
+            // Diagonals of the coarser cells alternate with the parity of the cell's place in the whole field.
             let cell = [0, 1].map(|k| (self.place.origin[k] + (at[k] << self.level)) >> (self.level + 1));
             if (cell[0] + cell[1]) & 1 == 1 {
                 apart[1] = -1;
@@ -143,7 +146,7 @@ impl ChunkLevel<'_> {
         apart
     }
 
-    /// The sample of a vertex; what sticks out of the field collapses onto its edge.
+    /// Returns the sample of a vertex. Vertices beyond the field collapse onto its edge.
     fn sample(&self, at: [i32; 2]) -> [u32; 2] {
         let size = self.field.size();
         [0, 1].map(|k| ((self.place.origin[k] + (at[k] << self.level)) as u32).min(size[k] - 1))
@@ -160,7 +163,7 @@ impl ChunkLevel<'_> {
     }
 }
 
-/// The ends of an edge, from its middle and half of it.
+/// Returns the ends of an edge, given its middle and half of it.
 fn ends(middle: [i32; 2], half: [i32; 2]) -> [[i32; 2]; 2] {
     [-1, 1].map(|sign| [0, 1].map(|k| middle[k] + sign * half[k]))
 }
@@ -170,7 +173,7 @@ fn middle<V: Value>(at: [i32; 2], half: [i32; 2], value: &impl Fn([i32; 2]) -> V
     before.middle(after)
 }
 
-/// A step along a side.
+/// Returns a step along a side.
 fn along(side: usize, step: i32) -> [i32; 2] {
     if side.is_multiple_of(2) { [0, step] } else { [step, 0] }
 }
@@ -181,7 +184,7 @@ mod tests {
     use crate::draw::Instance;
     use crate::draw::normals::explicit_normal;
     use crate::draw::place::explicit_height;
-    use crate::draw::weights::ONE;
+    use crate::draw::weights::{ONE, SlotWeights};
     use crate::height::{Holes, Samples};
 
     const CELLS: i32 = 16;
@@ -191,7 +194,7 @@ mod tests {
         Field::new(Samples::F32((0..49 * 49).map(height).collect()), [49; 2], [1.0; 2], Holes::none(49 * 49))
     }
 
-    /// A tile at a level, as it is drawn with weights inside and on the sides.
+    /// Heights of a tile at a level, morphed by the given weights.
     struct Shape {
         n: i32,
         heights: Vec<f32>,
@@ -201,7 +204,7 @@ mod tests {
         fn new(field: &Field, origin: [i32; 2], level: u32, inside: u32, sides: [u32; 4]) -> Self {
             let chunk = build(field, Place { origin, cells: CELLS }, level);
             assert_eq!(chunk.len(), vertices(CELLS, level));
-            let instance = Instance { weights: weights::uniform(inside, sides), ..Instance::default() };
+            let instance = Instance::default().with_weights(SlotWeights::uniform(inside, sides));
             Self { n: CELLS >> level, heights: chunk.iter().map(|vertex| explicit_height(&instance, vertex)).collect() }
         }
 
@@ -210,8 +213,8 @@ mod tests {
         }
     }
 
-    /// The ends, in units of a coarser grid, of the edge of it in whose middle a vertex lies, by the rule of the RTIN
-    /// pattern alone.
+    /// Returns the ends of the coarser grid's edge in whose middle a vertex lies, in units of that grid. Uses only the
+    /// rule of the RTIN pattern.
     fn ends(origin: [i32; 2], level: u32, [x, z]: [i32; 2]) -> [[i32; 2]; 2] {
         let (i, j) = (x.div_euclid(2), z.div_euclid(2));
         let place = origin.map(|n| n >> (level + 1));
@@ -223,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_morph_begins_as_the_finer_level_and_ends_as_the_coarser_one_to_the_bit() {
+    fn morph_ends_equal_both_levels_exactly() {
         let field = rough();
         let mut moved = 0;
         for (origin, level) in [[0, 0], [16, 0], [16, 32]].into_iter().flat_map(|o| (0..4).map(move |l| (o, l))) {
@@ -242,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_begin_as_the_samples_and_end_between_those_of_the_coarser_level() {
+    fn normals_morph_from_samples_to_the_coarser_level() {
         let field = rough();
         let mut moved = 0;
         for (origin, level) in [[0, 0], [16, 32]].into_iter().flat_map(|o| (0..4).map(move |l| (o, l))) {
@@ -254,7 +257,7 @@ mod tests {
                 field.normal((origin[0] + x * step) as u32, (origin[1] + z * step) as u32)
             };
             let drawn = |at: [i32; 2], weight: u32| {
-                let instance = Instance { weights: weights::uniform(weight, [weight; 4]), ..Instance::default() };
+                let instance = Instance::default().with_weights(SlotWeights::uniform(weight, [weight; 4]));
                 let k = (at[1] * (n + 1) + at[0]) as usize;
                 explicit_normal(&instance, &vertices[k], &normals[k])
             };
@@ -270,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_on_their_way_to_the_level_after_the_next_take_the_inside_along() {
+    fn sides_beyond_the_next_level_move_inside_targets() {
         let (field, sides) = (rough(), [0, 17, 40, ONE]);
         for (origin, level) in [[0, 0], [16, 32]].into_iter().flat_map(|o| (0..3).map(move |l| (o, l))) {
             let end = Shape::new(&field, origin, level, ONE, sides.map(|e| ONE + e));
@@ -290,12 +293,12 @@ mod tests {
     }
 
     #[test]
-    fn two_tiles_agree_on_their_side_whatever_its_weight() {
+    fn two_tiles_agree_on_their_shared_side_at_any_weight() {
         let field = rough();
         for (level, finer, weight) in
             (1..4).flat_map(|l| [l, l - 1].into_iter().flat_map(move |f| [0, 1, 33, ONE].map(|w| (l, f, w))))
         {
-            // West of x = 16 the level, east of it the same or one finer.
+            // The western tile has the level, the eastern one the same or one finer.
             let west = Shape::new(&field, [0, 16], level, 21, [5, 9, weight, 3]);
             let east = Shape::new(&field, [16, 16], finer, 50, [weight + (level - finer) * ONE, 7, 60, 0]);
             let step = 1 << (level - finer);

@@ -1,96 +1,95 @@
-//! How far morphs go on from one frame to the next: with time, with frames, or with the way that the viewer goes
-//! (Larsen & Christensen, §2.3).
+//! Advances morphs from frame to frame: by time, by frames, or by the viewer's movement (Larsen & Christensen, §2.3).
 
 use crate::view::{Lens, View};
 
 use super::levels;
 
-/// Seconds in which a level goes over into the next; as long as Hoppe's geomorphs (1998).
+/// Seconds in which a tile morphs by one level; the same as Hoppe's geomorphs (1998).
 const LEVEL_S: f64 = 1.0;
 
-/// Frames in which a level goes over into the next: half a second at 60 a second.
+/// Frames in which a tile morphs by one level: half a second at 60 frames a second.
 const LEVEL_FRAMES: f64 = 30.0;
 
-/// Part of the way to a tile that the viewer goes while it goes over into its next level. A turn by a whole view is as
-/// much, and so is a picture twice as large or a tolerance half as wide: they change levels too.
-const LEVEL_WAY: f64 = 0.25;
+/// Distance that the viewer moves while a tile morphs by one level, as a part of the distance to the tile. A rotation
+/// by the view's whole angle counts as one level. So does doubling the magnification or halving the tolerance.
+const LEVEL_DISTANCE: f64 = 0.25;
 
-/// Levels, or ways in tiles, that are too little for a step are kept for the next one.
+/// Minimum step, in levels or in tile sides. Smaller steps accumulate until they reach it.
 const MIN: f64 = 1.0 / 1024.0;
 
-/// What drives morphs.
+/// Source that advances morphs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drive {
-    /// Nothing: levels change at once.
+    /// None: levels change at once.
     AtOnce,
-    /// The scene's time.
+    /// The scene's time, seconds.
     Time,
-    /// Frames.
+    /// The number of frames.
     Frames,
-    /// The viewer's way: the land is still while the viewer is.
+    /// The viewer's movement. Levels are constant while the view is.
     Speed,
 }
 
-/// The clock of one land.
+/// Morph clock of one terrain.
 pub struct Clock {
     drive: Drive,
     /// Side of a tile, metres.
     side_m: f64,
     last: Option<View>,
-    /// What was too little for a step.
+    /// Accumulated step below the minimum.
     rest: Step,
 }
 
-/// How far morphs go on in a frame.
+/// Amount by which morphs advance in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Levels, everywhere.
+    /// Levels, for all tiles.
     pub levels: f64,
-    /// The viewer's way, metres: the nearer a tile, the more it is there.
-    pub way_m: f64,
+    /// Distance the viewer moved, metres. Nearer tiles advance more by it.
+    pub moved_m: f64,
 }
 
 impl Step {
-    const NONE: Step = Step { levels: 0.0, way_m: 0.0 };
-    /// As far as they have to go.
-    pub const AT_ONCE: Step = Step { levels: f64::INFINITY, way_m: 0.0 };
+    const NONE: Step = Step { levels: 0.0, moved_m: 0.0 };
+    /// Unlimited: morphs end at once.
+    pub const AT_ONCE: Step = Step { levels: f64::INFINITY, moved_m: 0.0 };
 
-    /// In a tile so far from the eye, in units of [`levels::ONE`].
+    /// Returns the step of a tile at this distance from the eye, in units of [`levels::ONE`].
     pub fn at(&self, distance_m: f64) -> u32 {
-        levels::fixed(self.levels + self.way_m / (LEVEL_WAY * distance_m))
+        levels::fixed(self.levels + self.moved_m / (LEVEL_DISTANCE * distance_m))
     }
 }
 
 impl Clock {
-    /// A clock that was never read. `side_m` is the length of a tile's side, metres.
+    /// Creates a clock without a last view. `side_m` is the length of a tile's side, metres.
     pub fn new(drive: Drive, side_m: f64) -> Self {
         Self { drive, side_m, last: None, rest: Step::NONE }
     }
 
-    /// What drives it.
+    /// Returns the source that advances morphs.
     pub fn drive(&self) -> Drive {
         self.drive
     }
 
-    /// How far morphs go on in this view, after the one before it. At first levels are where they belong at once.
+    /// Returns the step from the last view to this one. The first step is unlimited.
     pub fn step(&mut self, view: &View) -> Step {
         let Some(last) = self.last.replace(*view) else { return Step::AT_ONCE };
-        let Step { levels, way_m } = match self.drive {
+        let Step { levels, moved_m } = match self.drive {
             Drive::AtOnce => Step::AT_ONCE,
-            Drive::Time => Step { levels: (view.time_s - last.time_s) / LEVEL_S, way_m: 0.0 },
-            Drive::Frames => Step { levels: 1.0 / LEVEL_FRAMES, way_m: 0.0 },
-            Drive::Speed => way(&last, view),
+            Drive::Time => Step { levels: (view.time_s - last.time_s) / LEVEL_S, moved_m: 0.0 },
+            Drive::Frames => Step { levels: 1.0 / LEVEL_FRAMES, moved_m: 0.0 },
+            Drive::Speed => movement(&last, view),
         };
-        // Time that goes back, or is no number, moves nothing.
-        self.rest = Step { levels: self.rest.levels + levels.max(0.0), way_m: self.rest.way_m + way_m };
+        // Negative and NaN time steps count as zero.
+        self.rest = Step { levels: self.rest.levels + levels.max(0.0), moved_m: self.rest.moved_m + moved_m };
         let released = |rest: &mut f64, min: f64| if *rest < min { 0.0 } else { std::mem::take(rest) };
-        let Step { levels, way_m } = &mut self.rest;
-        Step { levels: released(levels, MIN), way_m: released(way_m, MIN * self.side_m) }
+        let Step { levels, moved_m } = &mut self.rest;
+        Step { levels: released(levels, MIN), moved_m: released(moved_m, MIN * self.side_m) }
     }
 }
 
-/// The way between two views.
-fn way(from: &View, to: &View) -> Step {
+/// Returns the step for the viewer's movement between two views.
+fn movement(from: &View, to: &View) -> Step {
     // The chord: precise for small angles, which arc cosines are not.
     let turned = [0, 1, 2].map(|k| from.world_from_eye.col(k).distance(to.world_from_eye.col(k)));
     let turned = turned.into_iter().fold(0.0, f64::max) / breadth(to);
@@ -99,10 +98,10 @@ fn way(from: &View, to: &View) -> Step {
     let is_other = from.tolerance.metric != to.tolerance.metric
         || std::mem::discriminant(&from.lens) != std::mem::discriminant(&to.lens);
     let levels = if is_other { f64::INFINITY } else { turned + scaled };
-    Step { levels, way_m: from.eye.distance(to.eye) }
+    Step { levels, moved_m: from.eye.distance(to.eye) }
 }
 
-/// Angle that a view is wide, radians.
+/// Returns the view's horizontal angle, radians; 1 for an orthographic view.
 fn breadth(view: &View) -> f64 {
     match view.lens {
         Lens::Perspective { fov_x } => fov_x.max(1e-3),
@@ -135,13 +134,13 @@ mod tests {
         clock
     }
 
-    /// In a tile 200 m away.
+    /// Steps the clock for a tile 200 m away.
     fn step(clock: &mut Clock, view: &View) -> u32 {
         clock.step(view).at(200.0)
     }
 
     #[test]
-    fn time_that_stands_still_leaps_or_goes_back() {
+    fn time_clock_handles_zero_large_and_negative_steps() {
         let mut clock = clock(Drive::Time);
         let mut at = |time_s| step(&mut clock, &view(DVec3::X * 1e9, 90.0, time_s));
         assert_eq!(at(5.0), 0);
@@ -158,13 +157,13 @@ mod tests {
         let after = |k: u32| f64::from(k) / 3e6;
         let sum: u32 = (1..=3_000_000).map(|k| step(&mut time, &view(DVec3::ZERO, 0.0, 5.0 + after(k)))).sum();
         assert!(sum.abs_diff(ONE) < ONE / 50, "{sum} of {ONE}");
-        let mut way = clock(Drive::Speed);
-        let sum: u32 = (1..=3_000_000).map(|k| step(&mut way, &view(DVec3::Z * 50.0 * after(k), 0.0, 5.0))).sum();
+        let mut speed = clock(Drive::Speed);
+        let sum: u32 = (1..=3_000_000).map(|k| step(&mut speed, &view(DVec3::Z * 50.0 * after(k), 0.0, 5.0))).sum();
         assert!(sum.abs_diff(ONE) < ONE / 50, "{sum} of {ONE}");
     }
 
     #[test]
-    fn the_terrain_is_still_while_the_viewer_is() {
+    fn speed_clock_stops_while_the_view_is_constant() {
         let mut clock = clock(Drive::Speed);
         let mut at = |view: &View| step(&mut clock, view);
         assert_eq!(at(&view(DVec3::ZERO, 0.0, 1e9)), 0);
@@ -180,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_counted_whatever_is_seen() {
+    fn frame_clock_is_independent_of_the_view() {
         let mut clock = clock(Drive::Frames);
         let sum: u32 = (0..30).map(|_| step(&mut clock, &view(DVec3::ZERO, 0.0, 5.0))).sum();
         assert!(sum.abs_diff(ONE) <= 30, "{sum}");

@@ -1,34 +1,34 @@
-//! How far the shapes of a tile are from the samples.
+//! Measures the distance of a tile's surface from the samples, at each level and while it morphs.
 //!
-//! Between whole weights heights are affine in each weight that they depend on: the tile's own, and that of the one
-//! side that a triangle may touch. So the largest distances are at whole weights: a level as it is, its sides one level
-//! coarser; and on the way to the next level the inside arrived while the sides have not begun, or the sides two levels
-//! coarser while the inside has not begun. All other ends are a level as it is.
+//! A triangle's heights depend on two weights: the tile's own, and that of the one side that it may touch. Between
+//! whole weights they are affine in each, so the largest distances are at whole weights. These are a level without
+//! morph, and one with its sides one level coarser. During a morph they are the inside fully morphed and the sides not,
+//! or the sides two levels coarser and the inside not morphed. All other extremes are levels without morph.
 
 use super::chunk::{self, Place};
 use super::pattern::{self, Triangle};
 use crate::draw::place::explicit_height;
-use crate::draw::weights::{self, ONE};
+use crate::draw::weights::{ONE, SlotWeights};
 use crate::draw::{ExplicitVertex, Instance};
 use crate::height::Field;
 use crate::height::surface::{self, Corner};
 
-/// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
-/// the two steps of `draw::place::explicit_height`.
+/// Rounding bound of morphed heights, relative to the largest height: at most 12 half-ulps, six for each of the two
+/// steps of `draw::place::explicit_height`.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// How much greater the error of a level of a tile that morphs is taken to be than that of the level before, at least:
-/// where two are alike, a tile would go through both at once.
+/// Minimum growth of the error from level to level in a tile that morphs. With equal errors a tile would morph through
+/// both levels at once.
 const GROWTH: f32 = 1.3;
 
-/// One tile while it is measured.
+/// A tile to measure.
 pub struct Tile<'a> {
     field: &'a Field,
     place: Place,
 }
 
 impl<'a> Tile<'a> {
-    /// The tile at a place.
+    /// Creates the tile at a place.
     pub fn new(field: &'a Field, place: Place) -> Self {
         Self { field, place }
     }
@@ -38,13 +38,13 @@ impl<'a> Tile<'a> {
         [0, 1].map(|k| (self.place.origin[k] + self.place.cells).min(size[k] as i32 - 1))
     }
 
-    /// Whether it sticks out of the field. Such a tile does not morph inside: the field's edge is no vertex of the
-    /// next level.
+    /// Returns true if the tile extends beyond the field. The inside of such a tile does not morph, because the field's
+    /// edge is not a vertex of the next level.
     pub fn is_partial(&self) -> bool {
         (0..2).any(|k| self.place.origin[k] + self.place.cells > self.last()[k])
     }
 
-    /// Range of heights, metres; `None` if no triangle of the finest level has data.
+    /// Returns the range of heights, metres; `None` if no triangle of the finest level has data.
     pub fn range_of_terrain(&self) -> Option<[f32; 2]> {
         surface::has_terrain(self.field, self.place.origin, self.last()).then(|| self.range())
     }
@@ -55,22 +55,23 @@ impl<'a> Tile<'a> {
         heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)])
     }
 
-    /// ε by level, metres, rising: true for all that is drawn at the level and, if tiles morph, on the way to it. 0 at
-    /// level 0, where only a coarser side is off the samples, which the tile beyond it answers for.
+    /// Returns the error ε by level, metres, rising. It bounds all that is drawn at the level and, if tiles morph, during
+    /// the morph to it. It is 0 at level 0: there only a coarser side deviates from the samples, and the tile beyond that
+    /// side accounts for it.
     pub fn errors(&self, morphs: bool) -> Vec<f32> {
         let mut largest = 0.0f32;
         let levels = 0..=self.place.cells.ilog2();
         let [low, high] = self.range();
         let rounding = if morphs { low.abs().max(high.abs()) * ROUNDING } else { 0.0 };
         let mut errors = Vec::new();
-        let mut way = 0.0;
+        let mut morphed = 0.0;
         for level in levels {
             let chunk = chunk::build(self.field, self.place, level);
             let own = if level == 0 { 0.0 } else { self.level_error(&chunk, level) };
-            largest = if morphs { largest * GROWTH } else { largest }.max(own).max(way);
-            // Where nothing is off the samples nothing moves.
+            largest = if morphs { largest * GROWTH } else { largest }.max(own).max(morphed);
+            // A level without error does not move at all.
             errors.push(if largest > 0.0 { largest + rounding } else { 0.0 });
-            way = if morphs { self.way_error(&chunk, level) } else { 0.0 };
+            morphed = if morphs { self.morph_error(&chunk, level) } else { 0.0 };
         }
         errors
     }
@@ -79,7 +80,7 @@ impl<'a> Tile<'a> {
         self.place.cells >> level
     }
 
-    /// The error of a level, its sides coarser or not.
+    /// Returns the error of a level, metres, with and without coarser sides.
     fn level_error(&self, chunk: &[ExplicitVertex], level: u32) -> f32 {
         let n = self.n(level);
         let still = if n == 1 { self.single() } else { [pattern::centre(n), pattern::border(n, 0)].concat() };
@@ -87,24 +88,25 @@ impl<'a> Tile<'a> {
         self.error(chunk, n, [0, 0], &still).max(self.error(chunk, n, [0, ONE], &stitched))
     }
 
-    /// The error of what is new on the way to the next level.
-    fn way_error(&self, chunk: &[ExplicitVertex], level: u32) -> f32 {
+    /// Returns the largest error, metres, of the shapes that occur only during the morph to the next level.
+    fn morph_error(&self, chunk: &[ExplicitVertex], level: u32) -> f32 {
         let n = self.n(level);
         let arrived = if n == 1 || self.is_partial() { Vec::new() } else { pattern::border(n, 0) };
-        // No level is two levels coarser than that of two cells.
+        // Levels of two cells and fewer have no level two levels coarser.
         let behind = if n <= 2 { Vec::new() } else { pattern::border(n, 15) };
         self.error(chunk, n, [ONE, 0], &arrived).max(self.error(chunk, n, [0, 2 * ONE], &behind))
     }
 
-    /// The triangles of a tile of a single cell.
+    /// Returns the triangles of a tile of a single cell.
     fn single(&self) -> Vec<Triangle> {
         let odd = ((self.place.origin[0] + self.place.origin[1]) / self.place.cells) & 1;
         crate::height::rtin::cell(odd, 0).map(|triangle| triangle.map(|[x, z]| [x - odd, z])).into()
     }
 
-    /// The largest distance of triangles, weighted inside and on all sides, from the samples.
+    /// Returns the largest distance of triangles from the samples, metres, at these morph weights of the inside and of
+    /// all sides.
     fn error(&self, chunk: &[ExplicitVertex], n: i32, [inside, side]: [u32; 2], triangles: &[Triangle]) -> f32 {
-        let instance = Instance { weights: weights::uniform(inside, [side; 4]), ..Instance::default() };
+        let instance = Instance::default().with_weights(SlotWeights::uniform(inside, [side; 4]));
         let size = self.field.size();
         let corner = |[x, z]: [i32; 2]| {
             let vertex = &chunk[(z * (n + 1) + x) as usize];
@@ -124,7 +126,7 @@ mod tests {
 
     const CELLS: i32 = 16;
 
-    /// 2 × 2 tiles, rough only near a column of samples, or near one sample.
+    /// Returns a field of 2 × 2 tiles that is rough only near a column of samples, or near one sample.
     fn rough_near(x: u32, z: Option<u32>, random: &mut impl FnMut() -> f32) -> Field {
         let size = 2 * CELLS as u32 + 1;
         let near = |k: u32| (k % size).abs_diff(x) < 3 && z.is_none_or(|z| (k / size).abs_diff(z) < 3);
@@ -132,10 +134,10 @@ mod tests {
         Field::new(Samples::F32(heights.collect()), [size; 2], [1.0; 2], Holes::none((size * size) as usize))
     }
 
-    /// Half way between a vertex of the side that goes up and one inside that goes down, and the inside goes first: a
-    /// sample that level 1 is off by as much as level 2 is off by half as much again on the way.
+    /// A sample half way between a rising vertex of the side and a falling one inside, where the inside morphs first.
+    /// Levels 1 and 2 deviate by 1 m there, and the morph between them by 1.5 m.
     #[test]
-    fn a_way_may_be_further_off_than_both_its_ends() {
+    fn morph_error_can_exceed_both_levels() {
         let size = CELLS as u32 + 1;
         let height = |k: u32| match (k % size, k / size) {
             (0, 2) => -1.0,
@@ -147,15 +149,15 @@ mod tests {
         let tile = Tile::new(&field, Place { origin: [0, 0], cells: CELLS });
         let ends = [1, 2].map(|level| tile.level_error(&chunk::build(&field, tile.place, level), level));
         assert!(ends.iter().all(|end| (end - 1.0).abs() < 1e-6), "{ends:?}");
-        assert!((tile.way_error(&chunk::build(&field, tile.place, 1), 1) - 1.5).abs() < 1e-6);
+        assert!((tile.morph_error(&chunk::build(&field, tile.place, 1), 1) - 1.5).abs() < 1e-6);
         let [morphing, still] = [true, false].map(|morphs| tile.errors(morphs)[2]);
         assert!(morphing >= 1.5 && still < 1.01, "{morphing} m, still {still} m");
     }
 
-    /// The bound of the way from one level to the next, at any weights inside and on the sides, and how often it is
-    /// needed beyond what levels are off when they are still.
+    /// Checks the bound of [`super::super::levels::ceiling`] at any weights of inside and sides, and that morphs do
+    /// exceed the errors of still levels.
     #[test]
-    fn no_weights_on_the_way_exceed_what_the_ceiling_counts_on() {
+    fn morph_error_stays_within_the_ceiling_bound() {
         let mut seed = 3u32;
         let mut random = || {
             seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
@@ -195,7 +197,7 @@ mod tests {
         }
         assert!(
             beyond_still > 0 && closest > 0.99,
-            "{beyond_still} beyond what levels are off, {closest} of the bound"
+            "{beyond_still} beyond the errors of still levels, {closest} of the bound"
         );
     }
 }

@@ -1,27 +1,29 @@
-//! Smooth tiles: chunks of geometry in device memory, morphed by the vertex program.
+//! Smooth tiles: chunks of vertices in device memory, morphed between levels by the vertex shader.
 //!
-//! After B. D. Larsen and N. J. Christensen, "Real-time Terrain Rendering using Smooth Hardware Optimized Level of
-//! Detail" (2003): tiles of 2^w + 1 vertices, the leaves of a quadtree, have levels by de Boer's metric. Each keeps a
-//! chunk of vertices on the device, with their places at the next level, and goes over into it gradually. A chunk is
-//! rebuilt when its tile changes level, a few in a frame.
+//! Based on B. D. Larsen and N. J. Christensen, "Real-time Terrain Rendering using Smooth Hardware Optimized Level of
+//! Detail" (2003). Tiles of (2^w + 1)² vertices are the leaves of a quadtree. De Boer's metric gives each tile a level.
+//! Each tile has one chunk of vertices on the device; every vertex also stores its place at the next level and morphs
+//! towards it. A chunk is rebuilt when its tile changes level, a limited number per frame.
 //!
-//! Where this differs from the paper, and why:
-//! - the levels of tiles are continuous numbers. A side has the greater one of its two tiles, which is what table 4
-//!   says: that of two equal tiles which coarsens takes the side along, that which refines does not; the coarser one
-//!   refining does, the finer one coarsening does not. Any number of neighbours may change in one frame;
-//! - the *finer* tile's border is modified, as in the figures (§2.2 says the other one's);
-//! - a tile has one chunk, not one and four borders: vertices of a side also know the level after the next, and where a
-//!   neighbour's level changes the border has other indices. Nothing is rebuilt for a neighbour. Five chunks would
-//!   have to build two borders anew for each tile that changes level (600 frames of five paths over real land, 2 px):
-//!   66 % more bytes uploaded with tiles of 9, 39 % with 17 and 20 % with 33; five draws a tile instead of two;
-//!   and 4n vertices more in a tile of n × n cells;
-//! - with the metric `certified` a morph gives way to the bound whatever the clock says, and it begins only where the
-//!   next level keeps the bound. Only where a refinement waits for its chunk may the bound be exceeded: the list says
-//!   in how many tiles;
-//! - a tile that sticks out of the field does not morph inside: the field's edge is no vertex of the next level.
+//! Differences from the paper:
+//! - Levels of tiles are continuous numbers. A shared side always uses the coarser level of its two tiles. All four
+//!   rows of table 4 follow from this: of two equal tiles, the one that coarsens moves the side and the one that
+//!   refines does not; between unequal tiles only the refining coarser one moves it. Any number of neighbours may
+//!   change in one frame.
+//! - The border of the *finer* tile is modified, as in the paper's figures (§2.2 says the coarser one's).
+//! - A tile has one chunk instead of a centre and four borders. Vertices of a side also store the level after the next.
+//!   A border selects other indices when a neighbour's level changes, so nothing is rebuilt for a neighbour. Five
+//!   chunks would rebuild two borders for each tile that changes level. Measured over 600 frames of five paths over
+//!   real terrain at 2 px, that is 66 % more uploaded bytes with tiles of 9 vertices a side, 39 % with 17 and 20 % with
+//!   33. It also takes five draws a tile instead of two, and 4n more vertices in a tile of n × n cells.
+//! - Under the metric `certified` the error bound overrides the clock, and a morph begins only where the next level
+//!   keeps the bound. Only tiles whose refined chunk is not built yet may exceed it; [`DrawList::pending`] counts those
+//!   in view.
+//! - The inside of a tile that extends beyond the field does not morph, because the field's edge is not a vertex of the
+//!   next level.
 //!
-//! Laws kept: watertight and within one level of each other in every frame, in mid-morph too; covered once; error
-//! within tolerance once nothing waits; the same list for the same view once it has settled.
+//! Invariants: watertight, and neighbours within one level, in every frame and at every morph weight; the field is
+//! covered once; error within tolerance once nothing is pending; the same list for the same view once it has settled.
 
 pub mod chunk;
 pub mod clock;
@@ -41,21 +43,22 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Entry, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
+use super::{Diagnostics, Entry, Gradual, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
-    Topology, Upload, VertexNormals, weights,
+    Topology, Upload, VertexNormals,
+    weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
-/// The most bytes uploaded in a frame: a staging buffer of this size is made for each frame in flight.
+/// Maximum number of bytes uploaded in a frame. Each frame in flight has a staging buffer of this size.
 const UPLOAD_BYTES: usize = 64 << 20;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "smooth-tiles",
-    about: "tiles of chunks in device memory, each going over into its next level",
+    about: "tiles with vertex chunks in device memory, each morphing into its next level",
     paper: "Larsen & Christensen 2003",
     variants: &[],
     settings: &[
@@ -69,31 +72,31 @@ pub const ENTRY: Entry = Entry {
             key: "morph",
             values: Values::Words(&["on", "off"]),
             default: "on",
-            about: "whether a level goes over into the next, or changes at once",
+            about: "on: levels morph into each other; off: they change at once",
         },
         Setting {
             key: "normals",
             values: Values::Words(&["texture", "vertex"]),
             default: "texture",
-            about: "what lights the land: the heights around each pixel, as elsewhere, or vertices' own normals that morph too",
+            about: "source of normals: texture = heights around each pixel; vertex = normals in the vertices, which morph too",
         },
         Setting {
             key: "clock",
             values: Values::Words(&["speed", "time", "frames"]),
             default: "speed",
-            about: "what drives morphs: the viewer's way, the scene's time, or frames",
+            about: "what advances morphs: the viewer's movement, the scene's time, or frames",
         },
         Setting {
             key: "rebuild",
             values: Values::Number(1.0, 100_000.0),
             default: "100000",
-            about: "chunks rebuilt in a frame at most (the paper: 1), and no more than 64 MiB hold",
+            about: "maximum chunks rebuilt per frame (the paper: 1); uploads never exceed 64 MiB",
         },
         Setting {
             key: "memory",
             values: Values::Number(1.0, 65536.0),
             default: "512",
-            about: "chunks on the device at most, MiB",
+            about: "maximum size of all chunks on the device, MiB",
         },
     ],
     needs: &[Need { key: "clock", other: "morph", words: &["on"] }],
@@ -103,7 +106,7 @@ pub const ENTRY: Entry = Entry {
     build: |field, settings| Box::new(SmoothTiles::new(field, settings)),
 };
 
-/// Names of the figures of table 2: triangles that a tile has less than at level 0.
+/// Names of the statistics of table 2: the share of triangles that a level saves over level 0.
 const REDUCTIONS: [&str; 6] = [
     "reduction at level 1",
     "reduction at level 2",
@@ -113,14 +116,14 @@ const REDUCTIONS: [&str; 6] = [
     "reduction at level 6",
 ];
 
-/// What a tile has on the device.
+/// Vertices of one tile at one level.
 struct Chunk {
     vertices: Vec<ExplicitVertex>,
-    /// As many; none where nothing is lit by them.
+    /// One per vertex; empty unless vertices carry normals.
     normals: Vec<VertexNormals>,
 }
 
-/// What a vertex takes on the device.
+/// Returns the bytes of one vertex on the device.
 fn vertex_bytes(has_normals: bool) -> usize {
     size_of::<ExplicitVertex>() + if has_normals { size_of::<VertexNormals>() } else { 0 }
 }
@@ -137,11 +140,12 @@ struct SmoothTiles {
     has_normals: bool,
     /// Side of a tile, metres.
     side_m: f64,
-    /// Level of each tile as it is drawn, in units of [`ONE`].
+    /// Drawn level of each tile, in units of [`ONE`].
     levels: Vec<u32>,
-    /// The most that each tile's bound allows, alone and beside its neighbours.
+    /// Maximum level that each tile's error bound allows, in units of [`ONE`]: of the tile alone, and restricted by its
+    /// neighbours.
     ceilings: [Vec<u32>; 2],
-    /// Whole levels that tiles are to stand on.
+    /// Whole level that each tile's chunk should have.
     aims: Vec<u32>,
     visible: Vec<usize>,
     is_visible: Vec<bool>,
@@ -213,7 +217,7 @@ impl SmoothTiles {
         }
     }
 
-    /// How coarse each tile may be in a view.
+    /// Computes how coarse each tile may be in a view.
     fn find_ceilings(&mut self, view: &View) {
         let [own, restricted] = &mut self.ceilings;
         let allowance = view.allowance();
@@ -225,8 +229,8 @@ impl SmoothTiles {
         levels::restrict(restricted, self.tiles.count);
     }
 
-    /// Finds how coarse tiles may be under the first tolerance at which the buffer holds them all, and returns its scale.
-    fn widen(&mut self, view: &View) -> f64 {
+    /// Finds the first tolerance at which the buffer holds all tiles, and their ceilings there. Returns its scale.
+    fn fit_tolerance(&mut self, view: &View) -> f64 {
         select_within_limits(view, |wider| {
             self.find_ceilings(wider);
             self.queue.holds(self.ceilings[1].iter().map(|level| level / ONE)).then_some(())
@@ -234,17 +238,17 @@ impl SmoothTiles {
         .1
     }
 
-    /// Moves levels on, as far as the clock and the bound say.
+    /// Moves levels towards their aims, limited by the clock and the error bound.
     fn move_levels(&mut self, view: &View) {
         let clock = self.clock.step(view);
-        // A full buffer has room only once tiles coarsen: they do at once.
+        // A full buffer frees memory only when tiles coarsen, so they coarsen at once.
         let step = if self.queue.is_short() { Step::AT_ONCE } else { clock };
         let ceilings = &self.ceilings[1];
         for (tile, level) in self.levels.iter_mut().enumerate() {
             let distance_m = self.tiles.bounds(tile).distance(view.eye).max(self.side_m);
             *level = levels::moved(*level, ceilings[tile], step.at(distance_m));
         }
-        // Steps differ from tile to tile.
+        // Steps differ from tile to tile, so neighbours may have moved apart.
         levels::restrict(&mut self.levels, self.tiles.count);
         self.aims.clear();
         self.aims.extend(self.levels.iter().map(|level| level / ONE));
@@ -258,7 +262,7 @@ impl SmoothTiles {
         visible.iter().for_each(|&tile| is_visible[tile] = true);
     }
 
-    /// Rebuilds what changes its level, as far as the frame's budget goes.
+    /// Rebuilds chunks of tiles that change level, within the frame's budget.
     fn rebuild(&mut self, view: &View, uploads: &mut Vec<Upload>) {
         let (tiles, is_visible) = (&self.tiles, &self.is_visible);
         let urgency = |tile: usize| (!is_visible[tile], tiles.bounds(tile).distance(view.eye));
@@ -273,13 +277,13 @@ impl SmoothTiles {
         }
     }
 
-    /// Draws of a tile: its centre, and the border for its neighbours.
+    /// Appends the draws of a tile: its centre, and the border for its neighbours' levels.
     fn push(&self, tile: usize, list: &mut DrawList) {
         let (level, batch) = (self.queue.levels[tile], list.instances.len() as u32);
         let place = self.tiles.place(tile);
         let (mask, weights) = self.border(tile);
         let (origin, cells) = (place.origin, place.cells as u32);
-        list.instances.push(Instance { origin, cells, level, batch, weights, ..Instance::default() });
+        list.instances.push(Instance { origin, cells, level, batch, ..Instance::default() }.with_weights(weights));
         let border = self.patterns.border(level, mask, self.tiles.is_odd(tile));
         for indices in [self.patterns.centres[level as usize].clone(), border] {
             if !indices.is_empty() {
@@ -290,8 +294,9 @@ impl SmoothTiles {
         }
     }
 
-    /// Which sides meet coarser tiles, and how far the tile's inside and its sides have gone.
-    fn border(&self, tile: usize) -> (usize, [u32; 4]) {
+    /// Returns the set of sides that meet coarser tiles (bit q: side q), and the morph weights of the inside and the
+    /// sides.
+    fn border(&self, tile: usize) -> (usize, SlotWeights) {
         let base = self.queue.levels[tile];
         let is_partial = self.tiles.is_partial(tile);
         let weight = |level: u32| (level - base * ONE) / (ONE / weights::ONE);
@@ -301,12 +306,12 @@ impl SmoothTiles {
             let other = other.unwrap_or(tile);
             let coarser = self.queue.levels[other].max(base);
             mask |= usize::from(coarser > base) << side;
-            // Between tiles that stick out the middles of edges are none.
+            // Between two tiles that extend beyond the field, middles of edges are not vertices of the coarser level.
             let stays = is_partial && self.tiles.is_partial(other);
             sides[side] = weight(if stays { coarser * ONE } else { self.levels[tile].max(self.levels[other]) });
         }
         let inside = if is_partial { 0 } else { weight(self.levels[tile]) };
-        (mask, weights::uniform(inside, sides))
+        (mask, SlotWeights::uniform(inside, sides))
     }
 }
 
@@ -322,27 +327,17 @@ impl Technique for SmoothTiles {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        list.tolerance_scale = self.widen(view);
+        list.tolerance_scale = self.fit_tolerance(view);
         self.move_levels(view);
         self.find_visible(view);
         self.rebuild(view, &mut list.uploads);
-        // What waits stays on its chunk: fully the next level, or fully its own.
-        for (level, &standing) in self.levels.iter_mut().zip(&self.queue.levels) {
-            *level = (*level).clamp(standing * ONE, (standing + 1) * ONE);
+        // A tile whose chunk is pending is drawn between its current level and the next one.
+        for (level, &current) in self.levels.iter_mut().zip(&self.queue.levels) {
+            *level = (*level).clamp(current * ONE, (current + 1) * ONE);
         }
-        let waits = |&&tile: &&usize| self.levels[tile] > self.ceilings[0][tile];
-        list.pending = self.visible.iter().filter(waits).count();
+        let is_pending = |&&tile: &&usize| self.levels[tile] > self.ceilings[0][tile];
+        list.pending = self.visible.iter().filter(is_pending).count();
         self.visible.iter().for_each(|&tile| self.push(tile, list));
-    }
-
-    fn is_settled(&self) -> bool {
-        // The viewer's way is over where the view stays the same.
-        let is_still = self.clock.drive() == Drive::Speed;
-        let stands = |tile: usize| {
-            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
-            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
-        };
-        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
     }
 
     fn keeps_tolerance(&self) -> bool {
@@ -354,6 +349,28 @@ impl Technique for SmoothTiles {
         PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Gradual for SmoothTiles {
+    fn is_settled(&self) -> bool {
+        // The viewer's way is over where the view stays the same.
+        let is_still = self.clock.drive() == Drive::Speed;
+        let stands = |tile: usize| {
+            let (aim, standing) = (self.ceilings[1][tile] / ONE, self.queue.levels[tile]);
+            self.levels[tile] == ONE * aim.clamp(standing, standing + 1)
+        };
+        self.queue.is_at_rest() && !self.queue.is_short() && (is_still || (0..self.tiles.total()).all(stands))
+    }
+}
+
+impl Diagnostics for SmoothTiles {
     fn omitted(&self) -> Vec<Omitted> {
         let indices = |finest: u32, alone: bool| {
             size_of_val(Patterns::new(self.tiles.cells, finest, alone).indices.as_slice()) as u64

@@ -1,30 +1,30 @@
-//! Which triangles a tile draws at each level, as indices into its chunk: the centre, and a border for each set of
+//! Builds the triangles of a tile at each level as indices into its chunk: the centre, and a border for each set of
 //! sides that meet a coarser tile. Vertices of a chunk are numbered row by row.
 
 use std::ops::Range;
 
 use crate::height::rtin;
 
-/// Sides of a tile: x = 0, z = 0, x = last, z = last. The neighbour's side on the other hand of side q is
-/// `(q + 2) % 4` (Larsen & Christensen, figure 8).
+/// Number of sides of a tile: x = 0, z = 0, x = last, z = last. Side q meets side `(q + 2) % 4` of the neighbour
+/// (Larsen & Christensen, figure 8).
 pub const SIDES: usize = 4;
 
-/// A triangle in the units of a level.
+/// A triangle as grid coordinates (x, z) of a level.
 pub type Triangle = [[i32; 2]; 3];
 
-/// All index patterns of tiles of one size.
+/// Index patterns of tiles of one size.
 pub struct Patterns {
-    /// All indices.
+    /// Indices of all patterns.
     pub indices: Vec<u32>,
-    /// By level: the cells that touch no side; nothing if there are none.
+    /// Index range by level of the cells that touch no side; empty if there are none.
     pub centres: Vec<Range<u32>>,
-    /// By level and by set of sides (bit q: side q meets a coarser tile): the cells that touch a side.
+    /// Index ranges by level and set of sides (bit q: side q meets a coarser tile) of the cells that touch a side.
     borders: Vec<[Range<u32>; 16]>,
 }
 
 impl Patterns {
-    /// Of tiles of so many cells a side, a power of two, without indices for levels finer than `finest` and, if the tile
-    /// is `alone`, for sides that meet others.
+    /// Builds the patterns of tiles with `cells` cells a side, a power of two. Omits indices for levels finer than
+    /// `finest` and, if the tile is `alone`, for sides that meet others.
     pub fn new(cells: i32, finest: u32, alone: bool) -> Self {
         let mut patterns = Self { indices: Vec::new(), centres: Vec::new(), borders: Vec::new() };
         for level in 0..=cells.ilog2() {
@@ -37,7 +37,7 @@ impl Patterns {
             let centre = patterns.append(n, &centre(n));
             patterns.centres.push(centre);
             let borders = std::array::from_fn(|mask| {
-                // A single cell has no vertex between its corners: the bit tells the diagonal.
+                // A single cell has no vertex between its corners; bit 0 selects the diagonal instead.
                 let triangles = if n == 1 {
                     rtin::cell(mask as i32 & 1, 0).map(|t| unshifted(t, mask)).into()
                 } else if alone && mask > 0 {
@@ -52,15 +52,16 @@ impl Patterns {
         patterns
     }
 
-    /// The border of a tile at a level, of which the sides of a set meet coarser tiles. A tile of a single cell
-    /// has its diagonal by its own parity among the tiles.
+    /// Returns the border of a tile at a level whose sides in `mask` meet coarser tiles. The diagonal of a tile of a
+    /// single cell depends on the parity of its place.
     pub fn border(&self, level: u32, mask: usize, is_odd: bool) -> Range<u32> {
         let borders = &self.borders[level as usize];
         let is_single = level as usize + 1 == self.borders.len();
         borders[if is_single { usize::from(is_odd) } else { mask }].clone()
     }
 
-    /// Triangles of a level of a tile beside none that is coarser: 2^(2(w − l) + 1) (Larsen & Christensen, §2).
+    /// Returns the number of triangles of a level whose neighbours are not coarser: 2^(2(w − l) + 1) (Larsen &
+    /// Christensen, §2).
     pub fn triangles(&self, level: u32) -> u32 {
         (self.centres[level as usize].len() + self.border(level, 0, false).len()) as u32 / 3
     }
@@ -72,27 +73,27 @@ impl Patterns {
     }
 }
 
-/// A triangle of the cell at (1, 0) moved to (0, 0).
+/// Moves a triangle of the cell at (1, 0) to (0, 0).
 fn unshifted(triangle: Triangle, mask: usize) -> Triangle {
     triangle.map(|[x, z]| [x - (mask as i32 & 1), z])
 }
 
-/// The cells of an n × n grid that touch no side.
+/// Returns the triangles of the cells of an n × n grid that touch no side.
 pub fn centre(n: i32) -> Vec<Triangle> {
     (1..n - 1).flat_map(|j| (1..n - 1).flat_map(move |i| rtin::cell(i, j))).collect()
 }
 
-/// The cells of an n × n grid, n even, that touch a side. On sides of the set the odd vertices fall onto the even ones
-/// before them: what is left of the triangles there is twice as long (figure 6).
+/// Returns the triangles of the cells of an n × n grid, n even, that touch a side. On sides in `mask`, odd vertices
+/// snap to the even ones before them, which leaves triangles twice as long (figure 6).
 pub fn border(n: i32, mask: usize) -> Vec<Triangle> {
     let on = |i: i32| i == 0 || i == n - 1;
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| [i, j])).filter(|&[i, j]| on(i) || on(j));
-    let fallen = |triangle: Triangle| triangle.map(|vertex| fallen(n, mask, vertex));
-    let triangles = cells.flat_map(|[i, j]| rtin::cell(i, j)).map(fallen);
+    let snapped = |triangle: Triangle| triangle.map(|vertex| snap(n, mask, vertex));
+    let triangles = cells.flat_map(|[i, j]| rtin::cell(i, j)).map(snapped);
     triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect()
 }
 
-fn fallen(n: i32, mask: usize, [x, z]: [i32; 2]) -> [i32; 2] {
+fn snap(n: i32, mask: usize, [x, z]: [i32; 2]) -> [i32; 2] {
     match side(n, [x, z]) {
         Some(side) if mask >> side & 1 == 1 => {
             if side % 2 == 0 {
@@ -105,7 +106,7 @@ fn fallen(n: i32, mask: usize, [x, z]: [i32; 2]) -> [i32; 2] {
     }
 }
 
-/// The side on which a vertex of an n × n grid lies; `None` inside and at a corner, which no level lacks.
+/// Returns the side on which a vertex of an n × n grid lies; `None` inside and at a corner, which every level has.
 pub fn side(n: i32, [x, z]: [i32; 2]) -> Option<usize> {
     let on = |k: i32| k == 0 || k == n;
     match (on(x), on(z)) {
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_has_the_published_number_of_triangles() {
+    fn triangle_counts_match_the_paper() {
         let patterns = Patterns::new(32, 0, false);
         for (level, percent) in [(0, 0.0), (1, 75.0), (2, 93.75), (3, 98.44), (4, 99.61)] {
             let triangles = patterns.triangles(level);
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn every_border_fills_its_cells_and_lacks_the_odd_vertices_of_its_sides() {
+    fn borders_cover_their_cells_without_odd_vertices() {
         for (n, mask) in [2, 4, 8].into_iter().flat_map(|n| (0..16).map(move |mask| (n, mask))) {
             let border = border(n, mask);
             assert_eq!(doubled_area(&border) + doubled_area(&centre(n)), 2 * n * n, "{n} {mask}");

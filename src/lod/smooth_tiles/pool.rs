@@ -1,16 +1,16 @@
-//! Where chunks lie in the one vertex buffer: pages of equal size, each cut into slots for chunks of one level while
-//! any of them is in use. What is freed serves any level again once its page is empty.
+//! Allocates chunks in one vertex buffer of equal pages. A page in use is divided into slots for chunks of one level;
+//! an empty page serves any level again.
 
-/// The slots of a buffer.
+/// Allocator of chunk slots in a vertex buffer.
 pub struct Pool {
-    /// Vertices of a page.
+    /// Vertices per page.
     page: usize,
-    /// Vertices of a slot, by level.
+    /// Vertices per slot, by level.
     sizes: Vec<usize>,
     pages: Vec<Page>,
-    /// Pages of no level.
+    /// Pages that no level uses.
     empty: Vec<u32>,
-    /// Pages of a level with a free slot, by level.
+    /// Pages with a free slot, by level.
     open: Vec<Vec<u32>>,
 }
 
@@ -22,11 +22,11 @@ struct Page {
     free: Vec<u32>,
 }
 
-/// Chunks of the finest level in a page: the more, the less of it is left over at other levels.
+/// Chunks of the finest level per page. More of them waste less of a page at other levels.
 const CHUNKS: usize = 4;
 
 impl Pool {
-    /// For chunks of these sizes by level, the greatest first: as many pages as hold `vertices` vertices.
+    /// Creates a pool for chunks of these sizes by level, largest first, with enough pages for `vertices` vertices.
     pub fn new(sizes: Vec<usize>, vertices: usize) -> Self {
         let page = CHUNKS * sizes[0];
         let count = vertices.div_ceil(page) as u32;
@@ -35,40 +35,41 @@ impl Pool {
         Self { page, sizes, pages, empty: (0..count).rev().collect(), open }
     }
 
-    /// Vertices of all pages.
+    /// Returns the number of vertices of all pages.
     pub fn vertices(&self) -> usize {
         self.pages.len() * self.page
     }
 
-    /// Vertices of all pages that are in use.
+    /// Returns the number of vertices of the pages in use.
     pub fn used_vertices(&self) -> usize {
         (self.pages.len() - self.empty.len()) * self.page
     }
 
-    /// Chunks in use.
+    /// Returns the number of chunks in use.
     pub fn held(&self) -> usize {
         self.pages.iter().map(|page| page.held).sum()
     }
 
-    /// Slots of a level in a page.
+    /// Returns the number of slots of a level in a page.
     fn slots(&self, level: u32) -> usize {
         self.page / self.sizes[level as usize]
     }
 
-    /// Vertices of pages that hold so many chunks of each level, and one page of each level more: what was freed may
-    /// leave that much in pieces.
+    /// Returns the vertices of the pages that hold `chunks` chunks by level. Includes one more page for each level, for
+    /// the loss by fragmentation.
     pub fn vertices_for(sizes: &[usize], chunks: &[usize]) -> usize {
         let page = CHUNKS * sizes[0];
         sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
     }
 
-    /// Vertices of pages that hold a number of chunks of any levels, with two pages of each level more.
+    /// Returns an upper bound on the vertices of pages for `chunks` chunks of any levels, with two more pages for each
+    /// level.
     pub fn max_vertices(sizes: &[usize], chunks: usize) -> usize {
         (chunks.div_ceil(CHUNKS) + 3 * sizes.len()) * CHUNKS * sizes[0]
     }
 
-    /// The first vertex of a free slot for a chunk of a level, if pages are left: of the empty ones `spare` are not
-    /// touched.
+    /// Allocates a slot for a chunk of a level and returns its first vertex. Returns `None` if that needs a new page
+    /// and at most `spare` pages are empty.
     pub fn take(&mut self, level: u32, spare: usize) -> Option<u32> {
         if self.open[level as usize].is_empty() {
             if self.empty.len() <= spare {
@@ -89,7 +90,7 @@ impl Pool {
         Some(page * self.page as u32 + slot * self.sizes[level as usize] as u32)
     }
 
-    /// Gives back what [`Self::take`] gave.
+    /// Frees a slot that [`Self::take`] returned.
     pub fn give(&mut self, first_vertex: u32) {
         let page = first_vertex / self.page as u32;
         let Page { level, ref mut held, ref mut free } = self.pages[page as usize];
@@ -106,7 +107,7 @@ impl Pool {
         }
     }
 
-    /// Whether so many chunks of each level can be taken now, whatever is given back meanwhile.
+    /// Returns true if `chunks` chunks by level can be allocated now, in any order, with `spare` pages left empty.
     pub fn holds(&self, chunks: &[usize], spare: usize) -> bool {
         let pages = |level: usize| {
             let open: usize = self.open[level].iter().map(|page| self.pages[*page as usize].free.len()).sum();
@@ -121,14 +122,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_chunks_share_a_vertex_and_nothing_leaks() {
+    fn chunks_never_overlap_or_leak() {
         let sizes = vec![81, 25, 9, 4];
         let mut pool = Pool::new(sizes.clone(), 20 * 324);
         let (mut held, mut seed, mut refused): (Vec<(u32, u32)>, u32, u32) = (Vec::new(), 1, 0);
         for step in 0..20_000 {
             seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
             let (choice, at) = (seed >> 24, (seed >> 8) as usize);
-            // In turns it fills up and is emptied.
+            // Phases of filling and emptying alternate.
             let fills = step / 500 % 2 == 0;
             if choice.is_multiple_of(4) != fills || held.is_empty() {
                 match pool.take(at as u32 % 4, 0) {

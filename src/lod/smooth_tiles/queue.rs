@@ -1,31 +1,31 @@
-//! Which tiles get new chunks in a frame: few at most, so that no frame takes long (Larsen & Christensen, §3). What
-//! waits keeps its chunk and its level, and neighbours stay within one level of each other all the while.
+//! Chooses the tiles whose chunks are rebuilt in a frame, a limited number of them (Larsen & Christensen, §3). A
+//! pending tile keeps its chunk and level; neighbours stay within one level of each other.
 
 use super::chunk;
 use super::pool::Pool;
 use super::tiles::Tiles;
 
-/// The most that a frame may rebuild.
+/// Maximum that a frame may rebuild.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
-    /// Chunks.
+    /// Number of chunks.
     pub chunks: usize,
-    /// Vertices of them all.
+    /// Number of vertices of all chunks.
     pub vertices: usize,
 }
 
 /// A tile that gets a new chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Move {
-    /// Which tile.
+    /// Index of the tile.
     pub tile: usize,
-    /// The level of the chunk.
+    /// Level of the new chunk.
     pub level: u32,
-    /// Where it lies in the buffer.
+    /// Its first vertex in the buffer.
     pub first_vertex: u32,
 }
 
-/// The chunks that tiles stand on, and those to come.
+/// Current chunks of all tiles, and their pending changes.
 pub struct Queue {
     cells: i32,
     /// Level of each tile's chunk.
@@ -33,23 +33,24 @@ pub struct Queue {
     /// First vertex of each tile's chunk.
     pub first_vertices: Vec<u32>,
     pool: Pool,
-    /// What is left of the frame's budget.
+    /// Rest of the frame's budget.
     left: Budget,
     moves: Vec<Move>,
     changed: Vec<usize>,
-    /// True if a chunk of the last frame found no room in the buffer.
+    /// True if the buffer could not hold a chunk of the last frame.
     is_short: bool,
 }
 
 impl Queue {
-    /// All tiles at their coarsest level, and at most so many vertices, if those fit.
+    /// Creates a queue with all tiles at their coarsest level. The buffer has at most `max_vertices` vertices, or more
+    /// if the coarsest level requires it.
     pub fn new(tiles: &Tiles, max_vertices: usize) -> Self {
         let sizes: Vec<_> = (0..tiles.levels).map(|level| chunk::vertices(tiles.cells, level)).collect();
         let (top, count) = (tiles.levels - 1, tiles.total());
         let all_at = |levels: &[u32]| -> Vec<usize> {
             (0..tiles.levels).map(|level| if levels.contains(&level) { count } else { 0 }).collect()
         };
-        // All of the finest level that is used, twice, so that all may change in one frame; the coarsest at least.
+        // Twice the finest level in use, so that all tiles may change in one frame; at least the coarsest level.
         let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
         let whole = whole.max(Pool::max_vertices(&sizes, count));
         let min = settled_vertices(&sizes, &all_at(&[top]));
@@ -61,7 +62,8 @@ impl Queue {
         Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed, is_short: false }
     }
 
-    /// Returns true if the buffer holds chunks of these levels, one a tile, with the pages for moves between them.
+    /// Returns true if the buffer holds one chunk of these levels for each tile, with spare pages to change between
+    /// them.
     pub fn holds(&self, levels: impl Iterator<Item = u32>) -> bool {
         let sizes: Vec<_> = (0..=self.cells.ilog2()).map(|level| chunk::vertices(self.cells, level)).collect();
         let mut chunks = vec![0; sizes.len()];
@@ -69,33 +71,33 @@ impl Queue {
         settled_vertices(&sizes, &chunks) <= self.vertices()
     }
 
-    /// True if a chunk of the last frame found no room in the buffer.
+    /// Returns true if the buffer could not hold a chunk of the last frame.
     pub fn is_short(&self) -> bool {
         self.is_short
     }
 
-    /// Vertices that the buffer holds.
+    /// Returns the capacity of the buffer, vertices.
     pub fn vertices(&self) -> usize {
         self.pool.vertices()
     }
 
-    /// Chunks in the buffer: one a tile.
+    /// Returns the number of chunks in the buffer, one for each tile.
     pub fn chunks(&self) -> usize {
         self.pool.held()
     }
 
-    /// Vertices of all pages of the buffer that are in use.
+    /// Returns the number of vertices of the pages in use.
     pub fn used_vertices(&self) -> usize {
         self.pool.used_vertices()
     }
 
-    /// Whether the last frame rebuilt nothing: the next one will not either, for the same aims.
+    /// Returns true if the last frame rebuilt nothing. With the same aims the next one will not either.
     pub fn is_at_rest(&self) -> bool {
         self.moves.is_empty()
     }
 
-    /// Moves tiles towards their aims, which are within one level of their neighbours', as far as the budget goes:
-    /// those that refine first, and of them those of the smallest `urgency`.
+    /// Moves tiles towards their aims within the budget: those that refine first, in order of rising `urgency`. Aims of
+    /// neighbours must be within one level of each other.
     pub fn advance<U: PartialOrd>(
         &mut self,
         tiles: &Tiles,
@@ -115,13 +117,13 @@ impl Queue {
             self.advance_in_turn(tiles, aims, &mut changed, urgency);
         }
         self.changed = changed;
-        // Who moved twice is written once, and what was taken and given back not at all.
+        // Keeps only the last move of each tile, so that nothing is written twice.
         let (levels, first_vertices) = (&self.levels, &self.first_vertices);
         self.moves.retain(|m| (levels[m.tile], first_vertices[m.tile]) == (m.level, m.first_vertex));
         &self.moves
     }
 
-    /// Whether all may change in this frame.
+    /// Returns true if all changes fit into this frame.
     fn all_fit(&self, changed: &[usize], aims: &[u32]) -> bool {
         let mut chunks = vec![0; self.cells.ilog2() as usize + 1];
         changed.iter().for_each(|&tile| chunks[aims[tile] as usize] += 1);
@@ -149,23 +151,23 @@ impl Queue {
         }
     }
 
-    /// Refines a tile to a level, at least its aim, and if its neighbours allow beyond it; neighbours that would be too
-    /// coarse beside it before. Whether it is there.
+    /// Refines a tile to `level` or finer, towards its aim as far as its neighbours allow. First refines neighbours
+    /// that would be too coarse beside it. Returns true if the tile has reached `level`.
     fn refine(&mut self, tiles: &Tiles, aims: &[u32], tile: usize, level: u32) -> bool {
         if self.left.chunks == 0 || self.levels[tile] <= level {
             return self.levels[tile] <= level;
         }
         let neighbours = tiles.neighbours(tile).into_iter().flatten();
-        // Each time for a coarser level: it comes to an end.
+        // Ends because each recursion requests a coarser level.
         if !neighbours.clone().all(|other| self.refine(tiles, aims, other, level + 1)) {
             return false;
         }
         let finest = neighbours.map(|other| self.levels[other].saturating_sub(1)).fold(aims[tile], u32::max);
-        // Some pages are left for what coarsens, which frees others.
+        // Leaves some pages for tiles that coarsen, which then free others.
         self.rebuild(tile, finest, tiles.levels as usize)
     }
 
-    /// Brings a tile towards its coarser aim, as far as its neighbours allow.
+    /// Coarsens a tile towards its aim, as far as its neighbours allow.
     fn coarsen(&mut self, tiles: &Tiles, aims: &[u32], tile: usize) {
         let neighbours = tiles.neighbours(tile).into_iter().flatten();
         let level = neighbours.map(|other| self.levels[other] + 1).fold(aims[tile], u32::min);
@@ -174,7 +176,8 @@ impl Queue {
         }
     }
 
-    /// Gives a tile a chunk of another level, if there is room for it, leaving so many pages empty.
+    /// Replaces a tile's chunk by one of another level, keeping `spare` pages empty. Returns false if the budget or the
+    /// buffer is exhausted.
     fn rebuild(&mut self, tile: usize, level: u32, spare: usize) -> bool {
         let vertices = chunk::vertices(self.cells, level);
         if self.left.chunks == 0 || self.left.vertices < vertices {
@@ -192,8 +195,8 @@ impl Queue {
     }
 }
 
-/// Vertices of a buffer that holds these chunks by level, with a page more of each of these levels, and a page of
-/// every level for chunks that give way.
+/// Returns the vertices of a buffer that holds these chunks by level. Includes one more page for each of these levels,
+/// and one page of every level for replaced chunks.
 fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
     let unused = chunks.iter().filter(|&&count| count == 0).count();
     let page = Pool::vertices_for(sizes, &vec![0; sizes.len()]) / sizes.len();

@@ -1,4 +1,4 @@
-//! What is known of every tile before any view, and the quadtree over them.
+//! Precomputed errors and height ranges of all tiles, and a quadtree over them.
 
 use rayon::prelude::*;
 
@@ -7,31 +7,31 @@ use super::measure::Tile;
 use crate::height::Field;
 use crate::view::{Aabb, Containment, Frustum};
 
-/// All tiles of a field.
+/// Tiles of a field.
 pub struct Tiles {
-    /// Cells along a side; the last ones may stick out of the field.
+    /// Cells along a side. The last tiles may extend beyond the field.
     pub cells: i32,
-    /// Levels of a tile, log2(cells) + 1.
+    /// Number of levels of a tile, log2(cells) + 1.
     pub levels: u32,
-    /// Tiles along (x, z).
+    /// Number of tiles along (x, z).
     pub count: [usize; 2],
-    /// ε by tile, then level, metres.
+    /// Error ε by tile, then level, metres.
     errors: Vec<f32>,
-    /// Range of heights, from the tiles up to one node; `None` where there is no land.
+    /// Height ranges by level, from the tiles up to one root; `None` where all samples are holes.
     tree: Vec<Nodes>,
     spacing: [f64; 2],
     origin: [f64; 2],
     last: [usize; 2],
 }
 
-/// One level of the quadtree: each node covers 2 × 2 of the level below, fewer at the field's far edges.
+/// One level of the quadtree. A node covers 2 × 2 nodes of the level below, fewer at the field's far edges.
 struct Nodes {
     count: [usize; 2],
     ranges: Vec<Option<[f32; 2]>>,
 }
 
 impl Tiles {
-    /// Measures a field whose tiles morph, or do not.
+    /// Measures all tiles of a field, with the errors of morphs if `morphs` is true.
     pub fn new(field: &Field, cells: i32, morphs: bool) -> Self {
         let last = field.size().map(|n| n as usize - 1);
         let count = last.map(|n| n.div_ceil(cells as usize));
@@ -50,40 +50,40 @@ impl Tiles {
         Self { cells, levels: cells.ilog2() + 1, count, errors: errors.concat(), tree, spacing, origin, last }
     }
 
-    /// How many there are.
+    /// Returns the number of tiles.
     pub fn total(&self) -> usize {
         self.count[0] * self.count[1]
     }
 
-    /// ε of a tile by level, metres.
+    /// Returns the error ε of a tile by level, metres.
     pub fn errors(&self, tile: usize) -> &[f32] {
         let levels = self.levels as usize;
         &self.errors[tile * levels..(tile + 1) * levels]
     }
 
-    /// The finest level that any tile needs whatever the tolerance: the coarsest at which all of them are exact.
+    /// Returns the finest level that any tile needs under any tolerance: the coarsest at which all of them are exact.
     pub fn finest(&self) -> u32 {
         let exact = |tile| self.errors(tile).iter().skip(1).take_while(|&&error| error == 0.0).count() as u32;
         (0..self.total()).map(exact).min().unwrap_or(0)
     }
 
-    /// Where a tile lies.
+    /// Returns the place of a tile among the samples.
     pub fn place(&self, tile: usize) -> Place {
         place(self.cells, self.count, tile)
     }
 
-    /// Whether a tile sticks out of the field.
+    /// Returns true if a tile extends beyond the field.
     pub fn is_partial(&self, tile: usize) -> bool {
         let Place { origin, cells } = self.place(tile);
         (0..2).any(|k| (origin[k] + cells) as usize > self.last[k])
     }
 
-    /// Whether a tile's place among the tiles is odd.
+    /// Returns true if the sum of a tile's two grid coordinates is odd.
     pub fn is_odd(&self, tile: usize) -> bool {
         (tile % self.count[0] + tile / self.count[0]) % 2 == 1
     }
 
-    /// The tiles beyond the sides x = 0, z = 0, x = last and z = last; at the field's border none.
+    /// Returns the neighbours beyond the sides x = 0, z = 0, x = last and z = last; `None` at the field's border.
     pub fn neighbours(&self, tile: usize) -> [Option<usize>; 4] {
         let [w, h] = self.count;
         let (i, j) = (tile % w, tile / w);
@@ -95,7 +95,7 @@ impl Tiles {
         ]
     }
 
-    /// The box around a tile; one without land has no height.
+    /// Returns the bounding box of a tile, metres. One without data has height 0.
     pub fn bounds(&self, tile: usize) -> Aabb {
         let range = self.tree[0].ranges[tile].unwrap_or_default();
         self.node_bounds(0, [tile % self.count[0], tile / self.count[0]], range)
@@ -111,7 +111,7 @@ impl Tiles {
         Aabb { min: corner(0, range[0]), max: corner(1, range[1]) }
     }
 
-    /// Calls `visit` for every tile with land that may be seen.
+    /// Calls `visit` for every tile with data whose box intersects the frustum.
     pub fn visit_visible(&self, frustum: &Frustum, visit: &mut impl FnMut(usize)) {
         self.descend(frustum, self.tree.len() - 1, [0, 0], false, visit);
     }

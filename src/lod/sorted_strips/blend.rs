@@ -1,18 +1,19 @@
-//! Vertices, and how they go over into the next level: a vertex is in the middle of an edge of that level, and either rises
-//! or falls to where that edge is drawn, or slides along it into one of its ends (Finch & Bishop, §4.9).
+//! Morphs vertices to the next level: vertically to the edge of that level, or along the edge into one of its ends
+//! (Finch & Bishop, §4.9).
 //!
-//! What slides has places between samples. Its way has as many steps as a sample has parts, so that each of its places lies
-//! on the lattice of these parts and on the edge, to the bit. An edge's ends stand while something slides between them: the
-//! table's levels are far enough apart for it ([`Radial`](super::table::Radial)). So no triangle turns over: what slides
-//! does so on a side of a triangle of the next level, and that triangle stands. The last of the steps is that in which it
-//! goes: a vertex in the end of its edge would leave triangles without area beside others that have not arrived yet.
+//! A vertex that slides has positions between samples. Its path has as many steps as a sample has fractional parts.
+//! Each position lies exactly on the lattice of these parts and on the edge. The ends of the edge do not move while a
+//! vertex slides between them, because the table's levels begin far enough apart ([`Radial`](super::table::Radial)). No
+//! triangle therefore flips: the vertex slides on a side of a triangle of the next level, and that triangle does not
+//! move. The vertex disappears in the last step. Reaching the end before that would leave triangles without area beside
+//! others that still morph.
 //!
-//! Lines between quads go along with what slides on them, while the walk knows quads by where they stand: some rays meet
-//! triangles out of order (9 of 50,656 in the room's tests, 3 pixels of a painter's would be wrong), so `order=painter` keeps
-//! the depth buffer then.
+//! Lines between quads move with the vertices on them, but the walk orders quads by their unmorphed positions. Some
+//! rays therefore meet triangles out of order: 9 of 50,656 in the tests, which would be 3 wrong pixels without a depth
+//! buffer. `order=painter` therefore uses the depth buffer with `blend=end`.
 //!
-//! What it is worth: jumps from frame to frame on the path `fly` over the demo, 640 × 360 pixels, `edge=10`, 120 frames, and
-//! the time of selection:
+//! Measured jumps from frame to frame on the path `fly` over the demo, 640 × 360 pixels, `edge=10`, 120 frames, and
+//! time of selection:
 //!
 //! | `blend` | 99th percentile | 99.9th | largest | selection |
 //! |---|---|---|---|---|
@@ -26,27 +27,27 @@ use super::walk::WalkContext;
 use crate::draw::ExplicitVertex;
 use crate::draw::place::morphed_height;
 
-/// Bits that the sides of a page and of a field may have in parts of samples: areas of triangles fit 32 bits, and positions
-/// are proven ([`watertight`](crate::measure::watertight)).
+/// Maximum bits of a page's and of a field's side in fractional parts of samples. Areas of triangles then fit 32 bits,
+/// and positions fit the exact arithmetic of [`watertight`](crate::measure::watertight).
 const BITS: [u32; 2] = [14, 24];
 
-/// How vertices go over into the next level.
+/// Morph of vertices to the next level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blend {
-    /// They are there at once.
+    /// None: vertices appear at once.
     #[default]
     Off,
-    /// Their heights go to that of the edge of the next level on which they lie.
+    /// Heights morph to the edge of the next level on which they lie.
     Height,
-    /// They go to an end of that edge, in all three dimensions, by so many bits of parts of a sample.
+    /// Vertices slide to an end of that edge in three dimensions. Stores the number of fractional bits of positions.
     End(u32),
 }
 
 impl Blend {
-    /// What the setting may be.
+    /// Words of the setting `blend`.
     pub const WORDS: &[&str] = &["off", "height", "end"];
 
-    /// What a word of the setting says over a field in pages: the smaller they are, the finer the parts.
+    /// Returns the morph for a word of the setting. The smaller pages and field are, the more fractional bits it has.
     pub fn of(word: &str, grid: &Grid) -> Self {
         match word {
             "height" => Blend::Height,
@@ -58,14 +59,14 @@ impl Blend {
         }
     }
 
-    /// Bits of positions that are parts of a sample.
+    /// Returns the number of fractional bits of positions.
     pub fn fraction_bits(self) -> u32 {
         if let Blend::End(bits) = self { bits } else { 0 }
     }
 }
 
 impl<L: Levels> WalkContext<'_, L> {
-    /// The vertex that is at a position when it stands: the same wherever it is asked for.
+    /// Returns the vertex whose unmorphed position is given; the same for every call in a frame.
     pub(super) fn vertex(&self, position: [i32; 2]) -> ExplicitVertex {
         let [x, z] = position;
         let height = self.height(position);
@@ -80,7 +81,7 @@ impl<L: Levels> WalkContext<'_, L> {
         let apart = half_edge(position, level);
         let ends = [-1, 1].map(|sign| [x + sign * apart[0], z + sign * apart[1]]);
         let last = self.pages.grid.last;
-        // The field's edge is no vertex of the next level, unless it is whole there.
+        // Next-level edges that extend beyond the field do not exist.
         let is_inside =
             (0..2).all(|k| ((position[k] >> (level + 1)) + i32::from(apart[k] != 0)) << (level + 1) <= last[k]);
         if morph == 0.0 || !is_inside {
@@ -105,7 +106,8 @@ impl<L: Levels> WalkContext<'_, L> {
     }
 }
 
-/// From a vertex that a level is the coarsest to have to one end of the edge of the next level in whose middle it is.
+/// Returns the step from a vertex to one end of the next level's edge in whose middle it lies. `level` is the coarsest
+/// level that has the vertex.
 fn half_edge(position: [i32; 2], level: u32) -> [i32; 2] {
     let step = 1 << level;
     let mut apart = position.map(|n| n & step);

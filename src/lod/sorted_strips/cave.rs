@@ -1,16 +1,17 @@
-//! Two fields in one stream: the floor and the ceiling of a cave, interleaved in the order of sight.
+//! Draws the floor and the ceiling of a cave as one stream of triangles in front-to-back order.
 //!
-//! Finch & Bishop name it as an extension: a second height field, whose triangles face down. Both are walked at once,
-//! over one set of split squares that keeps the bound for each of them, so that a ceiling's triangle lies over each
-//! floor's. Then:
-//! - **order**: rays meet such pairs one by one, as they meet the quads of one field, and within a pair the ceiling comes
-//!   first where the eye is above its plane, the floor elsewhere. A ray that leaves the eye between the two meets one of
-//!   them only: nothing has to be sorted;
-//! - **seam**: a vertex of rock ([`Cave`]) is one vertex for both. Triangles with three such are left out, and where they
-//!   were floor and ceiling end in the same edge, whatever the levels are.
+//! Finch & Bishop mention a second height field, whose triangles face down, as an extension. Both fields are walked at
+//! once over one set of split squares that keeps the error bound of both. Each ceiling triangle therefore lies above a
+//! floor triangle:
+//! - **Order**: rays meet these pairs in the same order as the quads of one field. Within a pair the ceiling comes
+//!   first if the eye is above its plane, otherwise the floor. A ray from an eye between the two meets only one of
+//!   them. Nothing needs to be sorted.
+//! - **Seam**: a rock vertex ([`Cave`]) is shared by both surfaces. Triangles with three rock vertices are omitted.
+//!   Floor and ceiling end in the same edge there, at any levels.
 //!
-//! The bound is that of each surface from its own welded samples. Where a coarse triangle is left out although there is a
-//! cave below it, floor and ceiling are both within their bounds of where it was: the cave closes there.
+//! The error bound of each surface is relative to its own welded samples. A coarse triangle may be omitted over a
+//! narrow cave: floor and ceiling are then both within their bounds of the omitted triangle, and the cave is closed
+//! there.
 
 use std::sync::Arc;
 
@@ -32,35 +33,35 @@ use crate::draw::{
 };
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::lod::{Settings, Technique, select_within_limits};
+use crate::lod::{Diagnostics, Settings, Technique, select_within_limits};
 use crate::view::{Containment, Lens, View};
 
 /// Sorted strips over a floor and a ceiling.
 pub struct CaveStrips {
     cave: Arc<Cave>,
-    /// Of floor and ceiling.
+    /// Errors of floor and ceiling.
     errors: [Errors; 2],
-    /// By page: whether there is anything but rock.
+    /// True for each page that contains anything but rock.
     is_open: Vec<bool>,
     shapes: Shapes,
     pages: Pages,
     splits: Splits,
-    /// One a row of pages.
+    /// One for each row of pages.
     rows: Vec<RowWorker>,
     sequence: Sequence,
     topology: Topology,
-    /// Indices of a frame as they are walked: three a triangle.
+    /// Maximum number of indices of a frame as a triangle list, three per triangle.
     max_indices: usize,
     limits: Limits,
-    /// Parts of the picture beside it in which squares are as fine as in it.
+    /// Width of the band that is as fine as the picture, in parts of the picture's size.
     guard: f64,
-    nothing: Geometry,
+    empty: Geometry,
 }
 
-/// Whether a technique with these settings draws caves, or why not.
+/// Checks that a technique with these settings draws caves.
 ///
 /// # Errors
-/// One line that says what is expected.
+/// Returns one line that states the expected setting.
 pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
     if technique != ENTRY.name {
         return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
@@ -76,7 +77,7 @@ pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
     }
 }
 
-/// What a row is made with.
+/// Buffers of one row.
 #[derive(Default)]
 struct RowWorker {
     worker: Worker,
@@ -84,7 +85,7 @@ struct RowWorker {
 }
 
 impl CaveStrips {
-    /// Measures both fields. Of the room's settings it takes `page`, `order`, `topology` and `guard`; levels are certified.
+    /// Measures both fields. Uses the settings `page`, `order`, `topology` and `guard`; levels are certified.
     pub fn new(cave: Arc<Cave>, settings: &Settings) -> Self {
         let grid = Grid::new(cave.floor(), (settings.number("page") as u32).ilog2(), MAX_PAGES);
         let (pages, cells) = (grid.count[0] as usize * grid.count[1] as usize, grid.side() as usize);
@@ -111,37 +112,37 @@ impl CaveStrips {
             max_indices,
             limits,
             guard: settings.number("guard"),
-            nothing: Geometry::default(),
+            empty: Geometry::default(),
         }
     }
 
-    /// Finds the pages in sight.
-    fn look(&mut self, view: &View) {
+    /// Finds the visible pages.
+    fn find_pages(&mut self, view: &View) {
         let (field, grid, errors) = (self.cave.floor(), self.pages.grid, &self.errors);
-        let (mut seen, frustum) = (Vec::new(), view.frustum());
+        let (mut visible, frustum) = (Vec::new(), view.frustum());
         let range = joined(errors.each_ref().map(Errors::range));
         Footprint::new(field, view, range).visit_pages(&grid, |at| {
             let range = joined(errors.each_ref().map(|errors| errors.square(grid.level, at).range));
             let is_open = grid.index(at).is_some_and(|k| self.is_open[k]);
             if is_open && frustum.contains(&bounds(field, grid.level, at, range)) != Containment::Outside {
-                seen.push(at);
+                visible.push(at);
             }
         });
-        self.pages.set(seen);
+        self.pages.set(visible);
     }
 
-    /// Splits what either field needs; `false` if that is too much for any frame.
+    /// Splits the squares that either field requires; returns false if they exceed the limits of any frame.
     fn split(&mut self, view: &View) -> bool {
         self.splits.clear();
-        // A split square has at least six triangles more, floor and ceiling twice as many.
+        // A split square adds at least six triangles to the floor, and as many to the ceiling.
         let max = self.max_indices / 18 + 1;
-        let seen = guarded(view, self.guard);
+        let visible = guarded(view, self.guard);
         [self.cave.floor(), self.cave.ceiling()].into_iter().zip(&self.errors).all(|(field, errors)| {
-            Certified::new(field, errors, &self.pages, [view, &seen], max).split(&mut self.splits)
+            Certified::new(field, errors, &self.pages, [view, &visible], max).split(&mut self.splits)
         })
     }
 
-    /// Walks the rows of a frame; `false` if they do not fit.
+    /// Walks the rows of a frame; returns false if they exceed the limits.
     fn walk(&mut self, view: &View, traversal: &TraversalDirection, rows: &[Row]) -> bool {
         let (field, rays) = (&**self.cave.floor(), RaySource::new(self.cave.floor(), view));
         let (pages, levels, shapes) = (&self.pages, &self.splits, &self.shapes);
@@ -151,9 +152,9 @@ impl CaveStrips {
             context.walk_on(row, worker);
             pairs.fill(&self.cave, &rays, &worker.stream);
         });
-        let made = || self.rows[..rows.len()].iter().map(|row| &row.pairs.stream);
-        made().map(|s| s.vertices.len()).sum::<usize>() <= self.limits.vertices
-            && made().map(|s| s.indices.len()).sum::<usize>() <= self.max_indices
+        let streams = || self.rows[..rows.len()].iter().map(|row| &row.pairs.stream);
+        streams().map(|s| s.vertices.len()).sum::<usize>() <= self.limits.vertices
+            && streams().map(|s| s.indices.len()).sum::<usize>() <= self.max_indices
     }
 
     fn fill(&self, rows: usize, list: &mut DrawList) {
@@ -175,7 +176,7 @@ impl CaveStrips {
 
 impl Technique for CaveStrips {
     fn resident(&self) -> &Geometry {
-        &self.nothing
+        &self.empty
     }
 
     fn limits(&self) -> Limits {
@@ -183,7 +184,7 @@ impl Technique for CaveStrips {
     }
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.look(view);
+        self.find_pages(view);
         let traversal = TraversalDirection::new(self.cave.floor(), view);
         let rows = self.pages.rows(&traversal);
         self.rows.resize_with(rows.len().max(self.rows.len()), RowWorker::default);
@@ -200,6 +201,12 @@ impl Technique for CaveStrips {
         true
     }
 
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Diagnostics for CaveStrips {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let open = self.is_open.iter().filter(|is_open| **is_open).count();
         let bytes = self.errors.iter().map(Errors::bytes).sum::<usize>();
@@ -211,14 +218,14 @@ fn joined([a, b]: [[f32; 2]; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Whether a page holds anything but rock.
+/// Returns true if a page contains anything but rock.
 fn is_open(cave: &Cave, grid: &Grid, page: u32) -> bool {
     let at = [page % grid.count[0], page / grid.count[0]];
     let samples = |k: usize| at[k] << grid.level..=((at[k] + 1) << grid.level).min(grid.last[k] as u32);
     samples(1).any(|j| samples(0).any(|i| !cave.is_rock(i, j)))
 }
 
-/// Where rays come from, in samples and metres: a point, or a direction that they come from.
+/// Origin of rays, in samples and metres: a point, or the direction opposite to parallel rays.
 struct RaySource {
     from: [f64; 3],
     is_point: bool,
@@ -234,7 +241,7 @@ impl RaySource {
         }
     }
 
-    /// Whether rays come from above the plane of a triangle that faces up.
+    /// Returns true if rays come from above the plane of a triangle that faces up.
     fn is_above(&self, triangle: [&ExplicitVertex; 3]) -> bool {
         let [a, b, c] = triangle.map(|v| [f64::from(v.position[0]), f64::from(v.height), f64::from(v.position[1])]);
         let from_a = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
@@ -244,28 +251,28 @@ impl RaySource {
     }
 }
 
-/// A row of a floor, and the ceiling over it.
+/// Triangles of one row, each floor triangle with the ceiling triangle above it.
 #[derive(Default)]
 struct Pairs {
     stream: Stream,
-    /// By vertex of the floor: the ceiling's over it, the same one at rock.
-    over: Vec<u32>,
+    /// Index of the ceiling vertex above each floor vertex; the same vertex at rock.
+    ceiling_vertices: Vec<u32>,
 }
 
 impl Pairs {
     fn fill(&mut self, cave: &Cave, rays: &RaySource, floor: &Stream) {
-        let Self { stream: Stream { vertices, indices }, over } = self;
+        let Self { stream: Stream { vertices, indices }, ceiling_vertices } = self;
         vertices.clear();
         vertices.extend_from_slice(&floor.vertices);
-        over.clear();
+        ceiling_vertices.clear();
         indices.clear();
         for (k, vertex) in (0u32..).zip(&floor.vertices) {
             let [i, j] = vertex.position.map(|n| n as u32);
             if cave.is_rock(i, j) {
-                over.push(k);
+                ceiling_vertices.push(k);
             } else {
                 let height = cave.ceiling().height(i, j);
-                over.push(vertices.len() as u32);
+                ceiling_vertices.push(vertices.len() as u32);
                 vertices.push(ExplicitVertex { height, target: height, ..*vertex });
             }
         }
@@ -274,7 +281,7 @@ impl Pairs {
             (bx - ax) * (cz - az) == (bz - az) * (cx - ax)
         };
         for low in floor.indices.as_chunks::<3>().0 {
-            let high = low.map(|k| over[k as usize]);
+            let high = low.map(|k| ceiling_vertices[k as usize]);
             if *low == high || is_flat(low) {
                 continue;
             }

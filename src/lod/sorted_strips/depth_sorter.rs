@@ -1,32 +1,32 @@
-//! The order of quads in the eye's own pages, where one direction of the walk is not away from the eye for all of them.
+//! Sorts quads in the eye's own row and column of pages, where the walk does not lead away from the eye.
 //!
-//! Everywhere else rays go the way that strips are walked. Rays that go against it begin in the eye's own column of pages,
-//! or in its own row, and the walk makes what they meet furthest first. There the quads of a run are put in order
-//! after they are made. They are squares of a quadtree, or two of its squares that one line parts from the rest of theirs:
-//! of the two halves on both sides of a line the eye's own comes first, whatever ray is followed. So a quad has a key,
-//! page first, then at each level on which side of the two lines in the middle it is, 0 where the eye is too.
+//! Everywhere else rays run in the direction of the walk. Rays against it start in the eye's own column or row of
+//! pages, and meet the quads there in reverse order of generation. The quads of a run are therefore sorted afterwards.
+//! Each is a square of a quadtree, or a pair of squares separated from their siblings by one line. Of the two halves
+//! beside such a line, the eye's half comes first for every ray. The sort key of a quad is its page, followed by its
+//! sides of the two middle lines at each level: 0 on the eye's side.
 
-/// Where the eye is in a run, and which rays of the view go against the walk.
+/// Position of the eye in a run, and the directions in which rays run against the walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crossing {
-    /// Where rays come from, counted from the run's first corner along (u, v).
+    /// Origin of rays relative to the run's first corner along (u, v), samples.
     pub eye: [f64; 2],
-    /// Whether any of them goes against the walk while it is over the run, along (u, v).
+    /// True if any ray over the run runs against the walk along (u, v).
     pub against: [bool; 2],
 }
 
 impl Crossing {
-    /// Whether the walk's own order is not that of every ray.
+    /// Returns true if the walk's order is wrong for some ray.
     pub fn is_any(&self) -> bool {
         self.against != [false; 2]
     }
 
-    /// The key of the square of a level at a place, both counted from the run's first corner, or of a pair that begins
-    /// with it; `page` is the level of pages. Quads that are ordered already have one key.
+    /// Returns the sort key of a square, or of a pair that begins with it. `at` is its place in squares of `level` from
+    /// the run's first corner; `page` is the level of pages. Quads already in order share one key.
     #[inline]
     fn key(&self, page: u32, level: u32, at: [i32; 2], is_pair: bool) -> u64 {
         let in_run = at[0] >> (page - level);
-        // Rays that go along with all strips are against the walk in the first page only.
+        // Rays along all strips run against the walk in the first page only.
         if !self.against[1] && in_run > 0 {
             return u64::MAX;
         }
@@ -43,7 +43,7 @@ impl Crossing {
     }
 }
 
-/// The quads of a run as they are made: where the indices of each begin, and its place in the order.
+/// Quads of a run in order of generation, each with its first index and its sort key.
 #[derive(Default)]
 pub struct DepthSorter {
     quads: Vec<Quad>,
@@ -58,8 +58,8 @@ struct Quad {
 }
 
 impl DepthSorter {
-    /// A quad begins with the index `first`: the square of a level at a place, counted from the run's first corner, or a
-    /// pair of squares that begins with it. `page` is the level of pages.
+    /// Begins a quad at index `first`: a square of a level at a place, counted from the run's first corner, or a pair
+    /// of squares that begins with it. `page` is the level of pages.
     #[inline]
     pub fn begin(&mut self, crossing: &Crossing, page: u32, (level, at): (u32, [i32; 2]), is_pair: bool, first: usize) {
         let (key, first) = (crossing.key(page, level, at, is_pair), first as u32);
@@ -71,7 +71,7 @@ impl DepthSorter {
         self.quads.push(Quad { key, first, end: first });
     }
 
-    /// Puts the quads in order, the last of which ends where `indices` end, and forgets them.
+    /// Sorts the quads' indices and clears the sorter. The last quad ends at the end of `indices`.
     pub fn finish(&mut self, indices: &mut [u32]) {
         let Some(&Quad { first, .. }) = self.quads.first() else { return };
         self.quads.last_mut().into_iter().for_each(|quad| quad.end = indices.len() as u32);
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_half_with_the_eye_comes_first() {
+    fn eye_half_comes_first() {
         let crossing = |eye| Crossing { eye, against: [true; 2] };
         let order = |eye: [f64; 2]| {
             let mut quads = [[0, 0], [1, 0], [0, 1], [1, 1]];
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_walks_own_order_stays_where_no_ray_goes_against_it() {
+    fn walk_order_is_kept_without_rays_against_it() {
         let crossing = Crossing { eye: [3.5, -9.0], against: [true, false] };
         let mut order = DepthSorter::default();
         let mut indices = Vec::new();

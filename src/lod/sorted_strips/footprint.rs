@@ -1,19 +1,19 @@
-//! The footprint of a view: what may be seen of the slab between the lowest and the highest land, from above (Finch &
-//! Bishop, §4.3), rastered to pages.
+//! Rasters the footprint of a view to pages: the part in plan of the slab between the lowest and the highest terrain
+//! that may be visible (Finch & Bishop, §4.3).
 //!
-//! Each plane of the frustum leaves half of the ground: what the plane keeps of the slab at some height. The footprint
-//! is what all five leave: a convex polygon around the published one, the shadow of frustum and slab together. It is
-//! larger near the polygon's corners only, and it holds every page whose box passes the planes one by one, which is how
-//! land is found to be out of sight everywhere in this crate.
+//! Each plane of the frustum leaves a half-plane of the ground: all places where it keeps the slab at some height. The
+//! footprint is the intersection of all five, a convex polygon around the published one, which is the shadow of frustum
+//! and slab together. It is larger only near the polygon's corners. It contains every page whose box passes the planes
+//! one by one, the visibility test of this crate.
 
 use super::pages::Grid;
 use crate::height::Field;
 use crate::view::View;
 
-/// What rounding may put outside, relative to the largest length.
+/// Margin for rounding, relative to the largest length.
 const SLACK: f64 = 1e-9;
 
-/// What the planes of a frustum leave of the ground: `x·p + z·q + offset ≥ 0`, metres from the first sample.
+/// Half-planes of a frustum on the ground: `x·p + z·q + offset ≥ 0`, metres from the first sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Footprint {
     halves: [[f64; 3]; 5],
@@ -21,7 +21,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The footprint of a view on land with heights from `low` to `high`, metres.
+    /// Computes the footprint of a view of terrain with heights from `low` to `high`, metres.
     pub fn new(field: &Field, view: &View, [low, high]: [f32; 2]) -> Self {
         let [x, z] = [view.eye.x - field.origin[0], view.eye.z - field.origin[1]];
         let extent_m = field.size().iter().zip(field.spacing).map(|(&n, s)| f64::from(n) * s).fold(0.0, f64::max);
@@ -34,7 +34,7 @@ impl Footprint {
         Self { halves: view.planes().map(half), spacing: field.spacing }
     }
 
-    /// Calls `visit` for each page that it touches, row by row.
+    /// Calls `visit` for each page that intersects the footprint, row by row.
     pub fn visit_pages(&self, grid: &Grid, mut visit: impl FnMut([i32; 2])) {
         for row in 0..grid.count[1] as i32 {
             let [first, last] = self.columns(grid, row);
@@ -42,31 +42,32 @@ impl Footprint {
         }
     }
 
-    /// The first and the last column that it touches in a row of pages; the last before the first if there is none.
+    /// Returns the first and the last column that the footprint intersects in a row of pages; the last is before the
+    /// first if there is none.
     fn columns(&self, grid: &Grid, row: i32) -> [i32; 2] {
         let ends_m =
             |k: usize, n: i32| [n, n + 1].map(|n| f64::from((n << grid.level).min(grid.last[k])) * self.spacing[k]);
-        let is_left = |[x, z, offset]: &[f64; 3], column: i32| {
+        let intersects = |[x, z, offset]: &[f64; 3], column: i32| {
             let highest = |normal: f64, [low, high]: [f64; 2]| (normal * low).max(normal * high);
             highest(*x, ends_m(0, column)) + highest(*z, ends_m(1, row)) + offset >= 0.0
         };
         let count = grid.count[0] as i32;
         let mut columns = [0, count - 1];
         for half in &self.halves {
-            // Along a row each half is kept from some column on, or up to some column.
-            let kept = if half[0] >= 0.0 {
-                [first_that(count, |column| is_left(half, column)), count - 1]
+            // In a row, each half-plane contains all columns from some column on, or all up to some column.
+            let inside = if half[0] >= 0.0 {
+                [partition_point(count, |column| intersects(half, column)), count - 1]
             } else {
-                [0, first_that(count, |column| !is_left(half, column)) - 1]
+                [0, partition_point(count, |column| !intersects(half, column)) - 1]
             };
-            columns = [columns[0].max(kept[0]), columns[1].min(kept[1])];
+            columns = [columns[0].max(inside[0]), columns[1].min(inside[1])];
         }
         columns
     }
 }
 
-/// The first of 0 to `count` for which something holds that holds for all after it too; `count` if there is none.
-fn first_that(count: i32, holds: impl Fn(i32) -> bool) -> i32 {
+/// Returns the first number of 0 to `count` that satisfies a monotonic predicate; `count` if none does.
+fn partition_point(count: i32, holds: impl Fn(i32) -> bool) -> i32 {
     let (mut low, mut high) = (0, count);
     while low < high {
         let middle = (low + high) / 2;
@@ -92,9 +93,9 @@ mod tests {
         (*seed >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// The pages are those whose boxes pass the planes, and they are a small part of all.
+    /// Compares the footprint with a test of every page's box, and checks that it is a small part of the field.
     #[test]
-    fn it_is_the_pages_whose_boxes_pass_the_planes() {
+    fn footprint_contains_all_visible_pages() {
         let mut seed = 1;
         let size = [320, 201];
         let mut field = Field::new(Samples::F32(vec![0.0; 320 * 201]), size, [3.0, 5.0], Holes::none(0));

@@ -1,8 +1,8 @@
-//! How far the quads of each level are from the samples, before any view.
+//! Measures the error of the quads of each level against the samples, in advance.
 //!
 //! A square of level l is drawn as one quad, with or without middles on its sides, or as half of a pair that matches a
-//! coarser quad: whatever the direction of the walk, all triangles that it may be part of are measured. Level 0 is
-//! the samples themselves but for pairs, which are off along the coarser quad's edge only: that is in its error.
+//! coarser quad. All triangles that it may be part of are measured, for every direction of the walk. Level 0 is exact
+//! except for pairs, which deviate only along the coarser quad's edge; that deviation is in the coarser quad's error.
 
 use rayon::prelude::*;
 
@@ -12,31 +12,31 @@ use crate::height::bounds::{KEPT_FROM, Square};
 use crate::height::disk_cache::DiskCache;
 use crate::height::surface::{self, Corner};
 
-/// Samples of a tiled field of which no two squares lie in their tiles alike, and that are measured all the same.
+/// Maximum number of samples measured of a tiled field whose squares never repeat within a tile.
 const MAX_SAMPLES: u64 = 1 << 22;
 
-/// All squares of a field up to a level.
+/// Errors and height ranges of all squares of a field up to a level.
 pub struct Errors {
     last: [i32; 2],
-    /// Whether an axis repeats.
+    /// True for each axis that repeats.
     is_tiled: [bool; 2],
     /// From level 1.
     levels: Vec<PageErrors>,
-    /// Of the last level: whether any triangle of the samples' own surface has data.
+    /// True for each square of the last level in which a triangle of the full-resolution surface has data.
     terrain: Vec<bool>,
 }
 
-/// The squares of a level; those of a tiled axis are held once.
+/// Squares of a level. Those of a tiled axis are stored once.
 struct PageErrors {
     count: [u32; 2],
     squares: Vec<Square>,
 }
 
-/// Corners in half sides from a square's first corner, by the parity of its place and by its place in its parent.
+/// Corners in half sides from a square's first corner, by the parity of its place and by its quarter of its parent.
 type Patterns = [[Vec<[[i32; 2]; 3]>; 4]; 2];
 
 impl Errors {
-    /// Measures a field up to level `max`, in parallel, or finds what was kept when it was measured before.
+    /// Measures a field up to level `max` in parallel, or reads the result from the disk cache.
     pub fn new(field: &Field, max: u32) -> Self {
         let (size, stored) = (field.size(), field.stored());
         let is_tiled = [0, 1].map(|k| size[k] > stored[k]);
@@ -54,19 +54,19 @@ impl Errors {
     fn measure(&mut self, field: &Field, max: u32) {
         let patterns = patterns();
         for level in 1..=max {
-            let level = self.measured(field, level, &patterns);
+            let level = self.measure_level(field, level, &patterns);
             self.levels.push(level);
         }
-        self.terrain = self.measured_terrain(field, max);
+        self.terrain = self.measure_terrain(field, max);
     }
 
-    /// Everything that was measured.
+    /// Returns the measured data as bytes for the disk cache.
     fn content(&self) -> Vec<u8> {
         let squares = self.levels.iter().flat_map(|level| bytemuck::cast_slice(&level.squares));
         squares.copied().chain(self.terrain.iter().map(|&is_terrain| is_terrain.into())).collect()
     }
 
-    /// Takes what was measured of a field like this one; `false`, and nothing changes, if it is not that long.
+    /// Reads the data of a field of the same size. Returns false and changes nothing if the length does not match.
     fn fill(&mut self, field: &Field, max: u32, content: &[u8]) -> bool {
         let counts: Vec<_> = (1..=max).map(|level| self.count(field, level).unwrap_or([1, 1])).collect();
         let squares = |[x, z]: [u32; 2]| x as usize * z as usize;
@@ -85,12 +85,12 @@ impl Errors {
         true
     }
 
-    fn measured_terrain(&self, field: &Field, level: u32) -> Vec<bool> {
+    fn measure_terrain(&self, field: &Field, level: u32) -> Vec<bool> {
         let count = self.levels[level as usize - 1].count;
         let is_terrain = |at: [u32; 2]| {
             let first = at.map(|n| (n as i32) << level);
             let last = [0, 1].map(|k| (first[k] + (1 << level)).min(self.last[k]));
-            // Squares that may lie anywhere have land if the field has.
+            // Squares shared by many places have data if the field has.
             let anywhere = count == [1, 1] && self.is_tiled != [false; 2];
             if anywhere {
                 surface::has_terrain(field, [0; 2], self.last)
@@ -101,59 +101,61 @@ impl Errors {
         places(count).map(is_terrain).collect()
     }
 
-    /// Whether any triangle of the samples' own surface has data in a square of the last level.
+    /// Returns true if a triangle of the full-resolution surface has data in a square of the last level.
     pub fn has_terrain(&self, at: [i32; 2]) -> bool {
         self.terrain[self.index(self.levels.len() as u32, at)]
     }
 
-    /// Bytes held.
+    /// Returns the size of the data, bytes.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(level.squares.as_slice())).sum()
     }
 
-    /// What is known of a square of a level from 1 on, in the field.
+    /// Returns the error and height range of a square of a level from 1 on.
     #[inline]
     pub fn square(&self, level: u32, at: [i32; 2]) -> Square {
-        let square = self.held(level, at);
+        let square = self.stored(level, at);
         if square.has_terrain() && self.is_tiled != [false; 2] && self.is_cut(level, at) {
             let parent =
-                if self.levels.len() > level as usize { self.held(level + 1, at.map(|n| n >> 1)) } else { square };
+                if self.levels.len() > level as usize { self.stored(level + 1, at.map(|n| n >> 1)) } else { square };
             return Square { error: parent.range[1] - parent.range[0], ..square };
         }
         square
     }
 
     #[inline]
-    fn held(&self, level: u32, at: [i32; 2]) -> Square {
+    fn stored(&self, level: u32, at: [i32; 2]) -> Square {
         self.levels[level as usize - 1].squares[self.index(level, at)]
     }
 
     #[inline]
     fn index(&self, level: u32, at: [i32; 2]) -> usize {
         let count = self.levels[level as usize - 1].count;
-        // Squares that may lie anywhere are one, along an axis that is not tiled too.
+        // A single shared square is used along an axis without tiling too.
         let repeats = |k: usize| self.is_tiled[k] || count[k] == 1;
         let [x, z] = [0, 1].map(|k| if repeats(k) { at[k] as u32 % count[k] } else { at[k] as u32 });
         z as usize * count[0] as usize + x as usize
     }
 
-    /// Whether the end of a tiled field cuts a square, or the pair of it and the next, which were measured whole.
+    /// Returns true if the end of a tiled field cuts a square, or the pair of it and the next, which were measured
+    /// whole.
     fn is_cut(&self, level: u32, at: [i32; 2]) -> bool {
         (0..2).any(|k| self.is_tiled[k] && ((at[k] >> 1) + 1) << (level + 1) > self.last[k])
     }
 
-    /// The range of all heights, metres; the lowest is above the highest if there is no land.
+    /// Returns the range of all heights, metres; the lowest exceeds the highest if there is no data.
     pub fn range(&self) -> [f32; 2] {
         self.levels.last().into_iter().flat_map(|level| &level.squares).fold(Square::NOTHING, |a, b| a.union(*b)).range
     }
 
-    /// Squares held of a level along (x, z); `None` if they are too many to measure: a tiled axis is held as far as its
-    /// squares, and the pairs of them, lie in their tile as none before did, or to the field's end.
+    /// Returns the number of stored squares of a level along (x, z); `None` if they are too many to measure. Along a
+    /// tiled axis they are stored until their position in the tile, and that of pairs of them, repeats, or up to the
+    /// field's end.
     fn count(&self, field: &Field, level: u32) -> Option<[u32; 2]> {
         let stored = field.stored();
         let length = |k: usize| {
             let (side, stored, last) = (2u64 << level, u64::from(stored[k]), self.last[k] as u64);
-            // Sides are powers of two: what they and the tile have in common are the tile's trailing zeros.
+            // Sides are powers of two, so their common factor with the tile is the tile's power of two.
             let repeats_after = stored * (side >> stored.trailing_zeros().min(level + 1));
             if self.is_tiled[k] { repeats_after.min(last) } else { last }
         };
@@ -163,21 +165,21 @@ impl Errors {
         fits.then(|| lengths.map(|length| length.div_ceil(1 << level) as u32))
     }
 
-    fn measured(&self, field: &Field, level: u32, patterns: &Patterns) -> PageErrors {
-        let Some(count) = self.count(field, level) else { return self.anything(field) };
-        let squares = places(count).map(|at| self.measured_square(field, level, at.map(|n| n as i32), patterns));
+    fn measure_level(&self, field: &Field, level: u32, patterns: &Patterns) -> PageErrors {
+        let Some(count) = self.count(field, level) else { return self.unbounded(field) };
+        let squares = places(count).map(|at| self.measure_square(field, level, at.map(|n| n as i32), patterns));
         PageErrors { count, squares: squares.collect() }
     }
 
-    /// Squares that may lie anywhere: their triangles are somewhere between the lowest and the highest sample.
-    fn anything(&self, field: &Field) -> PageErrors {
+    /// Returns one square for all places: its triangles lie between the lowest and the highest sample.
+    fn unbounded(&self, field: &Field) -> PageErrors {
         let heights = (0..field.samples().len()).map(|k| field.samples().height(k));
         let range = heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)]);
         PageErrors { count: [1, 1], squares: vec![Square { error: range[1] - range[0], range }] }
     }
 
-    fn measured_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
-        let inner = self.inner(field, level, at);
+    fn measure_square(&self, field: &Field, level: u32, at: [i32; 2], patterns: &Patterns) -> Square {
+        let inner = self.union_of_children(field, level, at);
         if !inner.has_terrain() {
             return inner;
         }
@@ -187,44 +189,44 @@ impl Errors {
         Square { error: error.max(inner.error), ..inner }
     }
 
-    /// What holds for the four squares in a square.
-    fn inner(&self, field: &Field, level: u32, [x, z]: [i32; 2]) -> Square {
+    /// Returns the union of a square's four children.
+    fn union_of_children(&self, field: &Field, level: u32, [x, z]: [i32; 2]) -> Square {
         if level == 1 {
             let first = [x << 1, z << 1];
-            let last = [0, 1].map(|k| self.within(k, first[k] + 2));
+            let last = [0, 1].map(|k| self.clamped(k, first[k] + 2));
             return Square { error: 0.0, range: range_of_data(field, first, last) };
         }
         let exists = |at: &[i32; 2]| (0..2).all(|k| self.is_tiled[k] || at[k] << (level - 1) < self.last[k]);
         let children = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| [2 * x + i, 2 * z + j]);
-        let held = &self.levels[level as usize - 2];
+        let stored = &self.levels[level as usize - 2];
         let child = |at: [i32; 2]| {
-            let [x, z] = [0, 1].map(|k| at[k] as u32 % held.count[k]);
-            held.squares[z as usize * held.count[0] as usize + x as usize]
+            let [x, z] = [0, 1].map(|k| at[k] as u32 % stored.count[k]);
+            stored.squares[z as usize * stored.count[0] as usize + x as usize]
         };
         children.into_iter().filter(exists).map(child).fold(Square::NOTHING, Square::union)
     }
 
-    /// A place along an axis: what sticks out of the field collapses onto its edge.
-    fn within(&self, axis: usize, n: i32) -> i32 {
+    /// Returns a coordinate along an axis; places beyond the field collapse onto its edge.
+    fn clamped(&self, axis: usize, n: i32) -> i32 {
         if self.is_tiled[axis] { n } else { n.min(self.last[axis]) }
     }
 
     fn deviation(&self, field: &Field, level: u32, at: [i32; 2], triangle: &[[i32; 2]; 3]) -> f32 {
         let corners = triangle.map(|halves| {
-            let [x, z] = [0, 1].map(|k| self.within(k, (2 * at[k] + halves[k]) << (level - 1)));
+            let [x, z] = [0, 1].map(|k| self.clamped(k, (2 * at[k] + halves[k]) << (level - 1)));
             Corner { x, z, y: field.height(x as u32, z as u32) }
         });
         if surface::doubled_area(&corners) == 0 { 0.0 } else { surface::deviation(field, &corners) }
     }
 }
 
-/// The places of a level's squares, row by row.
+/// Returns the places of a level's squares, row by row.
 fn places([x_count, z_count]: [u32; 2]) -> impl IndexedParallelIterator<Item = [u32; 2]> {
     let count = x_count as usize * z_count as usize;
     (0..count).into_par_iter().map(move |k| [k % x_count as usize, k / x_count as usize].map(|n| n as u32))
 }
 
-/// The range of all heights between two positions if any sample there has data: it may be alone among holes.
+/// Returns the range of all heights between two positions if any sample there has data; it may be alone among holes.
 fn range_of_data(field: &Field, first: [i32; 2], last: [i32; 2]) -> [f32; 2] {
     let samples = || (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| (i as u32, j as u32)));
     if field.holes().count() > 0 && samples().all(|(i, j)| field.is_hole(i, j)) {
@@ -233,13 +235,13 @@ fn range_of_data(field: &Field, first: [i32; 2], last: [i32; 2]) -> [f32; 2] {
     samples().map(|(i, j)| field.height(i, j)).fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
 }
 
-/// The eight ways to lay (along the strip, forward) onto (x, z): mirrored along either, and exchanged.
-fn lays() -> impl Iterator<Item = (bool, [bool; 2])> {
+/// Returns the eight maps of (along the strip, forward) onto (x, z): mirrored along either axis, and exchanged.
+fn orientations() -> impl Iterator<Item = (bool, [bool; 2])> {
     (0..8).map(|k| (k & 1 != 0, [k & 2 != 0, k & 4 != 0]))
 }
 
-/// Lays corners inside a square of `size` half sides onto the lattice; they face up again.
-fn laid(corners: [[i32; 2]; 3], size: i32, (exchanged, mirrored): (bool, [bool; 2])) -> [[i32; 2]; 3] {
+/// Maps corners inside a square of `size` half sides onto the lattice, facing up.
+fn orient(corners: [[i32; 2]; 3], size: i32, (exchanged, mirrored): (bool, [bool; 2])) -> [[i32; 2]; 3] {
     let mut corners = corners.map(|[u, v]| {
         let [x, z] = if exchanged { [v, u] } else { [u, v] };
         [if mirrored[0] { size - x } else { x }, if mirrored[1] { size - z } else { z }]
@@ -250,30 +252,32 @@ fn laid(corners: [[i32; 2]; 3], size: i32, (exchanged, mirrored): (bool, [bool; 
     corners
 }
 
-/// Every triangle that a square may be part of.
+/// Returns every triangle that a square may be part of.
 fn patterns() -> Patterns {
     let shapes = Shapes::default();
     let corners = |shape: &Shape| shape.triangles.iter().map(|&t| shape.corners(t)).collect::<Vec<_>>();
     let single = |parity: usize| {
         let shapes = &shapes;
-        lays().flat_map(move |lay| {
-            // A mirror turns the diagonal over, an exchange leaves it.
-            let rising = (parity == 0) == (lay.1[0] ^ lay.1[1]);
+        orientations().flat_map(move |orientation| {
+            // Mirroring flips the diagonal, exchanging the axes does not.
+            let rising = (parity == 0) == (orientation.1[0] ^ orientation.1[1]);
             let triangles: Vec<_> = shapes.singles(rising).iter().flat_map(corners).collect();
-            triangles.into_iter().map(move |t| laid(t, 2, lay)).collect::<Vec<_>>()
+            triangles.into_iter().map(move |t| orient(t, 2, orientation)).collect::<Vec<_>>()
         })
     };
-    // A pair fills the half of its parent at whose side the coarser quad is.
+    // A pair fills the half of its parent beside the coarser quad.
     let pair = |quarter: i32| {
-        lays()
-            .flat_map(move |lay| corners(Shapes::default().pair()).into_iter().map(move |t| laid(t, 4, lay)))
+        orientations()
+            .flat_map(move |orientation| {
+                corners(Shapes::default().pair()).into_iter().map(move |t| orient(t, 4, orientation))
+            })
             .map(move |t| t.map(|[x, z]| [x - 2 * (quarter & 1), z - 2 * (quarter >> 1)]))
     };
     [0, 1].map(|parity| {
         [0, 1, 2, 3].map(|quarter| {
-            // Only those that lie in the square in part: pairs on its parent's other sides are not.
+            // Keeps only triangles that overlap the square; pairs on its parent's other sides do not.
             let touches = |t: &[[i32; 2]; 3]| (0..2).all(|k| t.iter().any(|p| p[k] > 0) && t.iter().any(|p| p[k] < 2));
-            let mut all: Vec<_> = single(parity).chain(pair(quarter).filter(touches)).map(turned).collect();
+            let mut all: Vec<_> = single(parity).chain(pair(quarter).filter(touches)).map(rotated).collect();
             all.sort_unstable();
             all.dedup();
             all
@@ -281,8 +285,8 @@ fn patterns() -> Patterns {
     })
 }
 
-/// The same triangle from its smallest corner on.
-fn turned([a, b, c]: [[i32; 2]; 3]) -> [[i32; 2]; 3] {
+/// Returns the triangle rotated to begin with its smallest corner.
+fn rotated([a, b, c]: [[i32; 2]; 3]) -> [[i32; 2]; 3] {
     [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap_or([a, b, c])
 }
 
@@ -292,7 +296,7 @@ mod tests {
     use crate::height::{Holes, Samples};
 
     #[test]
-    fn patterns_are_few_and_face_up() {
+    fn patterns_face_up() {
         for triangles in patterns().as_flattened() {
             assert!((12..30).contains(&triangles.len()), "{}", triangles.len());
             for [a, b, c] in triangles {
@@ -302,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_kept_is_what_was_measured() {
+    fn cache_content_round_trips() {
         let rough = |size: [u32; 2], by: u32| {
             let heights = (0..size[0] * size[1]).map(|k| ((k * by) % 1009) as f32).collect();
             Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none((size[0] * size[1]) as usize))
@@ -320,14 +324,15 @@ mod tests {
         }
     }
 
-    /// A tiled field is known as well as one that holds all of its tiles, in `share` of its bytes at most.
-    fn as_if_held(size: [u32; 2], tiles: [u32; 2], share: usize) {
+    /// Compares a tiled field with a stored copy of all its tiles. The tiled one may use at most 1/`share` of the
+    /// bytes.
+    fn check_against_stored(size: [u32; 2], tiles: [u32; 2], share: usize) {
         let heights = (0..size[0] * size[1]).map(|k| ((k * 7919) % 1009) as f32).collect::<Vec<_>>();
         let field = Field::new(Samples::F32(heights), size, [1.0; 2], Holes::none(0)).tiled(tiles);
         let [w, h] = field.size();
-        let held = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
-        let held = Field::new(Samples::F32(held), [w, h], [1.0; 2], Holes::none(0));
-        let (tiled, whole) = (Errors::new(&field, 4), Errors::new(&held, 4));
+        let stored = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
+        let stored = Field::new(Samples::F32(stored), [w, h], [1.0; 2], Holes::none(0));
+        let (tiled, whole) = (Errors::new(&field, 4), Errors::new(&stored, 4));
         assert!(tiled.bytes() <= whole.bytes() / share);
         for level in 1..=4 {
             for (x, z) in (0..w as i32 >> level).flat_map(|x| (0..h as i32 >> level).map(move |z| (x, z))) {
@@ -340,15 +345,15 @@ mod tests {
     }
 
     #[test]
-    fn a_tiled_field_is_measured_once_and_for_all_tiles() {
-        as_if_held([64, 32], [3, 2], 3);
+    fn tiled_fields_are_measured_once() {
+        check_against_stored([64, 32], [3, 2], 3);
     }
 
-    /// Squares that lie in every tile in another way are measured in each.
+    /// Squares whose position differs in every tile are measured in each tile.
     #[test]
-    fn tiles_of_any_period_are_measured_to_the_bit() {
+    fn tiles_of_any_period_are_measured_exactly() {
         for (size, tiles) in [([41, 30], [4, 5]), ([64, 24], [3, 6]), ([3, 2], [20, 31]), ([17, 32], [40, 3])] {
-            as_if_held(size, tiles, 1);
+            check_against_stored(size, tiles, 1);
         }
     }
 }

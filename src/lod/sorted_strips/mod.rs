@@ -1,39 +1,41 @@
-//! Sorted strips: a stream of triangles in the order of sight, made anew for each frame.
+//! Sorted strips: a stream of triangles in front-to-back order, generated anew for each frame.
 //!
-//! After M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998). The part of the field in the view's footprint
-//! is walked in strips one quad wide; a level function says how large quads are, and five shapes of quads join what
-//! differs. Triangles come out nearest first, at a bounded amount of work for each, while nothing but the last strip is
-//! remembered. The paper's figures are lost: the shapes here follow from its rule that a quad's back edge uses exactly
-//! the vertices of the front edges behind it ([`shapes`], [`walk`]).
+//! Based on M. Finch and L. Bishop, "Sorted Height Field Rendering" (1998). The part of the field in the view's
+//! footprint is walked in strips one quad wide. A level function gives the size of quads, and five shapes of quads join
+//! different sizes. Triangles are generated nearest first, with bounded work per triangle and memory of the last strip
+//! only. The paper's figures are lost. The shapes here follow from its rule that a quad's back edge uses exactly the
+//! vertices of the front edges behind it ([`shapes`], [`walk`]).
 //!
-//! Where this differs from the paper, and why:
-//! - the level of a place is that of the *square* ahead, not of the vertex ahead, so that a bound can be kept over all
-//!   of it; for `level=uniform` that is the published table by squared distance, its condition checked and repaired
-//!   ([`table`]); for `level=certified` errors measured for every shape that a square may take ([`measure`],
-//!   [`certified`]), the set closed over squares that touch ([`splits`]);
-//! - shapes are combined where finer quads are on several sides of one: the published five are not enough there;
-//! - strips are walked outward from the eye on both sides of it, front to back, where the paper walks back to front in
-//!   one direction. `order=back` turns the list round: both orders are the same triangles. `order=painter` draws it so
-//!   without a depth buffer, and the picture is the same to the pixel;
-//! - a quad's triangles are ordered too, by the eye's side of the lines between them, and so are quads in the eye's own
-//!   row and column of pages, where some rays go against the walk ([`order`]);
-//! - the far plane that comes closer as the eye comes down (§4.10, `far`) takes whole pages away: what is left out is land in
-//!   sight, which the list says ([`DrawList::reach_m`]) and the prover takes into account. It is not needed to hold the
-//!   load: by apparent size it hardly grows on the way down. Over 4097 × 4097 samples of 10 m, pages of 16, `level=uniform`,
-//!   `edge=8`, 1280 × 720 pixels, from 1000 m down to 15 m, 221 k to 253 k triangles are drawn, with `far=32` 220 k to
-//!   134 k, with `far=8` 145 k to 32 k;
-//! - vertices go over into the next level only with `level=uniform`: a bound would be spent on it;
-//! - squares beside the picture are as fine as those in it, in a band ([`certified::guarded`]). On a circle flown in 24
-//!   frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px, a band of a quarter takes the largest jump from 78 px to
-//!   3.0 px and the 99.9th percentile from 26 px to 1.05 px, for a quarter more triangles (282 k to 351 k); a band
-//!   without end has the same jumps and 371 k;
-//! - pages are culled by boxes around their land, and those without land are no part of the footprint: holes stay.
+//! Differences from the paper:
+//! - The level of a place is that of the *square* ahead, not of the vertex ahead. An error bound can then hold over all
+//!   of the square. With `level=uniform` it is the published table by squared distance; its Lipschitz condition is
+//!   checked and repaired ([`table`]). With `level=certified` it follows from errors measured for every shape that a
+//!   square may take ([`measure`], [`certified`]). That set is closed over squares that touch ([`splits`]).
+//! - Shapes are combined where finer quads are on several sides of one, for which the published five do not suffice.
+//! - Strips are walked outward from the eye on both sides of it, front to back; the paper walks back to front in one
+//!   direction. `order=back` reverses the list; both orders have the same triangles. `order=painter` draws back to
+//!   front without a depth buffer, and the picture is identical to the pixel.
+//! - A quad's triangles are sorted too, by the eye's side of the lines between them. So are quads in the eye's own row
+//!   and column of pages, where some rays run against the walk ([`depth_sorter`]).
+//! - The far plane that approaches as the eye descends (§4.10, setting `far`) omits whole pages, including visible
+//!   terrain. [`DrawList::reach_m`] states the distance, and the watertightness check respects it. Limiting the load
+//!   does not require it: at constant screen-space size the load hardly grows on descent. Measured over 4097 × 4097
+//!   samples of 10 m, pages of 16, `level=uniform`, `edge=8`, 1280 × 720 pixels, from 1000 m down to 15 m. Without a
+//!   far plane 221 k to 253 k triangles are drawn; `far=32` draws 220 k to 134 k; `far=8` draws 145 k to 32 k.
+//! - Vertices morph to the next level only with `level=uniform`, because a morph would use up part of an error bound.
+//! - Squares in a band around the picture are as fine as those in it ([`certified::guarded`]). Measured on a circle
+//!   flown in 24 frames over 1025 × 1025 samples, 1280 × 720 pixels, 1 px: a band of a quarter reduces the largest jump
+//!   between frames from 78 px to 3.0 px and the 99.9th percentile from 26 px to 1.05 px. It adds a quarter more
+//!   triangles (282 k to 351 k). An infinite band has the same jumps and 371 k triangles.
+//! - Pages are culled by boxes around their terrain. Pages without data are not part of the footprint, so holes stay
+//!   holes.
 //!
-//! The surface is made of the samples at quads' corners and middles; plain quads have the crate's alternating
-//! diagonals, but a quad next to finer ones is a fan: the surface is no right-triangle mesh, and which of two levels
-//! gives way where they meet depends on the direction of the walk. The bound covers all of it.
+//! The surface consists of the samples at quads' corners and middles. Plain quads have the crate's alternating
+//! diagonals, but a quad next to finer ones is a fan, so the surface is not a right-triangle mesh. Which of two levels
+//! is modified where they meet depends on the direction of the walk. The error bound covers all cases.
 //!
-//! Laws kept: watertight, covered once, error within tolerance (`level=certified`), no state between views.
+//! Invariants: watertight; the field is covered once; error within tolerance (`level=certified`); no state between
+//! views.
 
 pub mod blend;
 pub mod cave;
@@ -65,9 +67,11 @@ use self::pages::{Grid, Pages, Row, TraversalDirection};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
-use self::table::{Radial, above_m};
+use self::table::{Radial, eye_height_m};
 use self::walk::{Stream, WalkContext, Worker};
-use super::{Entry, Need, Setting, Settings, Technique, Values, Variant, select_within_limits};
+use super::{
+    Diagnostics, Entry, Need, SelectInParts, Setting, Settings, Technique, Values, Variant, select_within_limits,
+};
 use crate::draw::{
     DepthMode, Draw, DrawKinds, DrawList, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
 };
@@ -75,74 +79,74 @@ use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, Lens, View};
 
-/// The most triangles of a frame, whatever the tolerance: buffers are made for them. Beyond it the tolerance is
-/// widened.
+/// Maximum number of triangles of a frame, for which buffers are allocated. The tolerance is scaled until they suffice.
 const MAX_TRIANGLES: usize = 1 << 21;
-/// The most pages: beyond it they are made larger.
+/// Maximum number of pages. Above it, pages are made larger.
 const MAX_PAGES: u64 = 1 << 16;
-/// Triangles of the frame before from which on rows are walked on all cores: for fewer it takes longer to share them out.
+/// Number of triangles in the last frame from which rows are walked on all cores. Below it, distributing them costs
+/// more.
 const MIN_PARALLEL: usize = 20_000;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "sorted-strips",
-    about: "triangles streamed in the order of sight, strip by strip",
+    about: "triangles streamed nearest first, strip by strip",
     paper: "Finch & Bishop 1998",
-    variants: &[Variant { name: "serial", about: "walked on one core, row after row: the same list" }],
+    variants: &[Variant { name: "serial", about: "walks rows serially on one core; same list" }],
     settings: &[
         Setting {
             key: "level",
             values: Values::Words(&["certified", "uniform"]),
             default: "certified",
-            about: "what sets a quad's level: its error, or its distance by a table, as published",
+            about: "certified: level by measured error; uniform: level by distance from a table, as published",
         },
         Setting {
             key: "page",
             values: Values::Words(&["16", "64", "256"]),
             default: "64",
-            about: "cells along a side of a page: no quad is larger",
+            about: "cells along a side of a page, the largest quad",
         },
         Setting {
             key: "order",
             values: Values::Words(Sequence::WORDS),
             default: "front",
-            about: "the nearest triangle first, or the furthest; painter: the furthest, and no depth buffer; or in no order",
+            about: "order of triangles: nearest first, furthest first, furthest first without a depth buffer, or random",
         },
         Setting {
             key: "topology",
             values: Values::Words(topology::WORDS),
             default: "list",
-            about: "three indices a triangle, or strips that end where the order of sight leaves them",
+            about: "list: three indices per triangle; strip: triangle strips that end where the order requires it",
         },
         Setting {
             key: "parts",
             values: Values::Number(1.0, 64.0),
             default: "1",
-            about: "parts of a frame with level=certified, each drawn while the next is walked: in pictures and times, not in the window",
+            about: "parts of a frame with level=certified, each drawn while the next is walked; not in the viewer",
         },
         Setting {
             key: "guard",
             values: Values::Number(0.0, 1000.0),
             default: "0.25",
-            about: "width of a band around the picture, in parts of it, as fine for level=certified as the picture",
+            about: "width of a band around the picture that is as fine, in parts of its size; for level=certified",
         },
         Setting {
             key: "far",
             values: Values::Number(0.0, 1e6),
             default: "0",
-            about: "land is drawn as far as so many heights of the eye above it and lengths of a page together; 0: all of it is",
+            about: "draw distance as a multiple of eye height plus page length; 0 = unlimited",
         },
         Setting {
             key: "edge",
             values: Values::Number(0.01, 1e4),
             default: "20",
-            about: "length of a triangle's side on the screen for level=uniform, in tolerances",
+            about: "length of a triangle's side on the screen for level=uniform, as a multiple of the tolerance",
         },
         Setting {
             key: "blend",
             values: Values::Words(Blend::WORDS),
             default: "off",
-            about: "how vertices of level=uniform go over into the next level: at once, up or down, or into an end of its edge",
+            about: "morph of vertices with level=uniform: none, vertical, or along the edge into one of its ends",
         },
     ],
     needs: &[
@@ -152,7 +156,7 @@ pub const ENTRY: Entry = Entry {
         Need { key: "blend", other: "level", words: &["uniform"] },
     ],
     max_samples: u64::MAX,
-    // The walk has a mark for each sample along a row of pages.
+    // The walk stores a mark for each sample along a row of pages.
     max_side: 1 << 22,
     takes_endless: false,
     build: |field, settings| match Cave::of(&field) {
@@ -167,27 +171,27 @@ struct SortedStrips {
     shapes: Shapes,
     pages: Pages,
     splits: Splits,
-    /// One a row of pages; if rows are walked one after the other, the first is for all.
+    /// One for each row of pages. If rows are walked serially, the first is used for all.
     workers: Vec<Worker>,
-    /// Length of a triangle's side, tolerances, if levels are uniform.
+    /// Length of a triangle's side in multiples of the tolerance; `None` with `level=certified`.
     edge: Option<f64>,
-    /// Width of the band around the picture that is as fine as the picture, pictures.
+    /// Width of the band that is as fine as the picture, in parts of the picture's size.
     guard: f64,
-    /// Heights of the eye, and lengths of a page, up to which land is drawn; 0: all of it is.
+    /// Draw distance in multiples of the sum of eye height and page length; 0 = unlimited.
     far: f64,
     blend: Blend,
     sequence: Sequence,
     topology: Topology,
-    /// The most parts of a frame, and one of them.
+    /// Maximum number of parts of a frame, and a buffer for one of them.
     parts: usize,
     part: DrawList,
     is_serial: bool,
-    /// Of the last frame.
+    /// Number of triangles of the last frame.
     triangles_before: usize,
-    /// Indices of a frame as they are walked: three a triangle.
+    /// Maximum number of indices of a frame as a triangle list, three per triangle.
     max_indices: usize,
     limits: Limits,
-    nothing: Geometry,
+    empty: Geometry,
 }
 
 impl SortedStrips {
@@ -198,7 +202,8 @@ impl SortedStrips {
         let topology = topology::of(settings.word("topology"));
         let sequence = Sequence::of(settings.word("order"));
         let level_is_certified = settings.word("level") == "certified";
-        // Others need all triangles at once, or have a level function whose triangles nobody counts before.
+        // Other settings need all triangles at once, or have a level function without a bound on the number of
+        // triangles.
         let comes_in_parts = level_is_certified && topology == Topology::Triangles && sequence != Sequence::Shuffled;
         let parts = if comes_in_parts { settings.number("parts") as usize } else { 1 };
         let [vertices, triangles] = if parts > 1 {
@@ -234,38 +239,38 @@ impl SortedStrips {
             triangles_before: 0,
             max_indices,
             limits,
-            nothing: Geometry::default(),
+            empty: Geometry::default(),
         }
     }
 
-    /// Finds the pages in sight.
-    fn look(&mut self, view: &View) {
+    /// Finds the visible pages.
+    fn find_pages(&mut self, view: &View) {
         let (field, grid, errors) = (&*self.field, self.pages.grid, &self.errors);
-        let (mut seen, range) = (Vec::new(), errors.range());
+        let (mut visible, range) = (Vec::new(), errors.range());
         let frustum = view.frustum().within(view.eye, self.reach_m(view));
         if range[0] <= range[1] {
             Footprint::new(field, view, range).visit_pages(&grid, |at| {
                 let page = errors.square(grid.level, at);
                 let bounds = bounds(field, grid.level, at, page.range);
                 if errors.has_terrain(at) && frustum.contains(&bounds) != Containment::Outside {
-                    seen.push(at);
+                    visible.push(at);
                 }
             });
         }
-        self.pages.set(seen);
+        self.pages.set(visible);
     }
 
-    /// How far land is drawn (Finch & Bishop, §4.10), metres in plan.
+    /// Returns the draw distance in plan, metres (Finch & Bishop, §4.10).
     fn reach_m(&self, view: &View) -> f64 {
         if self.far == 0.0 || matches!(view.lens, Lens::Orthographic { .. }) {
             return f64::INFINITY;
         }
         let page_m = f64::from(self.pages.grid.side()) * self.field.spacing[0].max(self.field.spacing[1]);
-        self.far * (above_m(&self.field, view) + page_m)
+        self.far * (eye_height_m(&self.field, view) + page_m)
     }
 
-    /// Walks the rows of a frame, each into a worker of its own in parallel, or one after the other into the only one;
-    /// how many vertices and indices each has. `None` if they would not fit the limits.
+    /// Walks the rows of a frame: in parallel with one worker each, or serially with a single worker. Returns the
+    /// number of vertices and indices of each row; `None` if they exceed the limits.
     fn walk(
         &self,
         levels: &impl Levels,
@@ -275,31 +280,30 @@ impl SortedStrips {
     ) -> Option<Vec<[usize; 2]>> {
         let (field, pages, shapes) = (&*self.field, &self.pages, &self.shapes);
         let context = WalkContext { field, pages, levels, shapes, traversal: *traversal, blend: self.blend };
-        let has_room =
-            |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.max_indices;
+        let fits = |[vertices, indices]: [usize; 2]| vertices <= self.limits.vertices && indices <= self.max_indices;
         if let [worker] = workers {
             let walk = |row: &Row| {
                 let before = worker.stream.lengths();
                 context.walk_on(row, worker);
                 let after = worker.stream.lengths();
-                has_room(after).then(|| [0, 1].map(|k| after[k] - before[k]))
+                fits(after).then(|| [0, 1].map(|k| after[k] - before[k]))
             };
             return rows.iter().map(walk).collect();
         }
         let sums = [AtomicUsize::new(0), AtomicUsize::new(0)];
         let walk = |(row, worker): (&Row, &mut Worker)| {
-            // Once there is too much, no further row is begun.
-            if !has_room(sums.each_ref().map(|sum| sum.load(Relaxed))) {
+            // Begins no further row once the limits are exceeded.
+            if !fits(sums.each_ref().map(|sum| sum.load(Relaxed))) {
                 return None;
             }
             context.walk_on(row, worker);
             let own = worker.stream.lengths();
-            has_room([0, 1].map(|k| sums[k].fetch_add(own[k], Relaxed) + own[k])).then_some(own)
+            fits([0, 1].map(|k| sums[k].fetch_add(own[k], Relaxed) + own[k])).then_some(own)
         };
         rows.par_iter().zip(workers).map(walk).collect()
     }
 
-    /// The frame's strips under the view's tolerance, as [`Self::walk`] leaves them.
+    /// Walks the frame's strips under the view's tolerance; returns the same as [`Self::walk`].
     fn strips(
         &mut self,
         view: &View,
@@ -318,23 +322,25 @@ impl SortedStrips {
         if self.split(view) { self.walk(&self.splits, traversal, rows, workers) } else { None }
     }
 
-    /// Splits the squares that the view's tolerance needs split; `false` if there are too many.
+    /// Splits the squares that the view's tolerance requires; returns false if they are too many.
     fn split(&mut self, view: &View) -> bool {
         self.splits.clear();
-        let seen = guarded(view, self.guard);
-        // A split square has at least six triangles more.
+        let visible = guarded(view, self.guard);
+        // A split square adds at least six triangles.
         let max = self.max_indices / 18 + 1;
-        Certified::new(&self.field, &self.errors, &self.pages, [view, &seen], max).split(&mut self.splits)
+        Certified::new(&self.field, &self.errors, &self.pages, [view, &visible], max).split(&mut self.splits)
     }
 
-    /// Splits what the view's tolerance needs; whether the frame fits its limits whatever comes of that.
-    fn surely_fits(&mut self, view: &View) -> bool {
-        let fits = self.split(view);
+    /// Splits the squares that the tolerance requires. Returns true if the frame fits the limits whatever triangles
+    /// result.
+    fn certainly_fits(&mut self, view: &View) -> bool {
+        let is_split = self.split(view);
         let max = parts::max_triangles(self.pages.list().len(), self.splits.count());
-        fits && 3 * max <= self.max_indices && max <= self.limits.vertices
+        is_split && 3 * max <= self.max_indices && max <= self.limits.vertices
     }
 
-    /// Walks group after group of rows; what is to be walked was split.
+    /// Walks one group of rows after the other over the squares already split, and calls `ready` after each but the
+    /// last.
     fn fill_in_parts(
         &mut self,
         (traversal, rows): (&TraversalDirection, &[Row]),
@@ -346,7 +352,7 @@ impl SortedStrips {
         let groups = parts::groups(rows, self.parts, self.sequence);
         for (k, group) in groups.iter().enumerate() {
             workers.iter_mut().for_each(|worker| worker.stream.clear());
-            let lengths = self.walk(&self.splits, traversal, group, workers).expect("room for all that may come");
+            let lengths = self.walk(&self.splits, traversal, group, workers).expect("the upper bound fits the limits");
             part.clear();
             self.fill(&lengths, workers, &mut part);
             parts::append(&part, list);
@@ -381,8 +387,8 @@ impl SortedStrips {
     }
 }
 
-/// All streams, one after the other; indices count from the first vertex of their own. Both are about as many bytes: one
-/// core copies the vertices, and one the indices.
+/// Concatenates all streams. Indices count from the first vertex of their own stream. Both arrays have about the same
+/// size, so one core copies the vertices and another the indices.
 fn join_streams(streams: &[&Stream], into: &mut Geometry) {
     let Geometry { vertices, indices, .. } = into;
     vertices.clear();
@@ -395,7 +401,7 @@ fn join_streams(streams: &[&Stream], into: &mut Geometry) {
 
 impl Technique for SortedStrips {
     fn resident(&self) -> &Geometry {
-        &self.nothing
+        &self.empty
     }
 
     fn limits(&self) -> Limits {
@@ -404,27 +410,6 @@ impl Technique for SortedStrips {
 
     fn select(&mut self, view: &View, list: &mut DrawList) {
         self.select_in_parts(view, list, &mut |_| ());
-    }
-
-    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
-        self.look(view);
-        list.reach_m = self.reach_m(view);
-        let traversal = TraversalDirection::new(&self.field, view);
-        let rows = self.pages.rows(&traversal);
-        let mut workers = std::mem::take(&mut self.workers);
-        workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
-        let is_serial = self.is_serial || self.triangles_before < MIN_PARALLEL;
-        let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
-        if self.parts > 1 && self.surely_fits(view) {
-            self.fill_in_parts((&traversal, &rows), of_frame, list, ready);
-        } else {
-            let (lengths, tolerance_scale) =
-                select_within_limits(view, |wider| self.strips(wider, &traversal, &rows, of_frame));
-            self.fill(&lengths, of_frame, list);
-            list.tolerance_scale = tolerance_scale;
-        }
-        self.workers = workers;
-        self.triangles_before = list.triangles() as usize;
     }
 
     fn keeps_tolerance(&self) -> bool {
@@ -439,11 +424,44 @@ impl Technique for SortedStrips {
         PipelineRequirements { draws, depth_mode, ..PipelineRequirements::default() }
     }
 
+    fn in_parts(&mut self) -> Option<&mut dyn SelectInParts> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl SelectInParts for SortedStrips {
+    fn select_in_parts(&mut self, view: &View, list: &mut DrawList, ready: &mut dyn FnMut(&DrawList)) {
+        self.find_pages(view);
+        list.reach_m = self.reach_m(view);
+        let traversal = TraversalDirection::new(&self.field, view);
+        let rows = self.pages.rows(&traversal);
+        let mut workers = std::mem::take(&mut self.workers);
+        workers.resize_with(rows.len().max(workers.len()).max(1), Worker::default);
+        let is_serial = self.is_serial || self.triangles_before < MIN_PARALLEL;
+        let of_frame = if is_serial { &mut workers[..1] } else { &mut workers[..] };
+        if self.parts > 1 && self.certainly_fits(view) {
+            self.fill_in_parts((&traversal, &rows), of_frame, list, ready);
+        } else {
+            let (lengths, tolerance_scale) =
+                select_within_limits(view, |wider| self.strips(wider, &traversal, &rows, of_frame));
+            self.fill(&lengths, of_frame, list);
+            list.tolerance_scale = tolerance_scale;
+        }
+        self.workers = workers;
+        self.triangles_before = list.triangles() as usize;
+    }
+}
+
+impl Diagnostics for SortedStrips {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         let pages = self.pages.grid.count.map(f64::from);
         vec![
             ("pages", pages[0] * pages[1], ""),
-            ("pages in sight", self.pages.list().len() as f64, ""),
+            ("visible pages", self.pages.list().len() as f64, ""),
             ("cells along a side of a page", f64::from(self.pages.grid.side()), ""),
             ("bytes of errors", self.errors.bytes() as f64, "B"),
         ]

@@ -1,9 +1,9 @@
-//! Pages: squares of the lattice that are drawn or not as a whole, and the order in which they are walked.
+//! Pages: squares of the lattice that are drawn as a whole or not at all, and the order in which they are walked.
 //!
-//! Rows of pages along the minor direction are walked outward from the eye's own row, and in each row pages outward
-//! from the eye's own column. So every ray that leaves the eye meets pages in the order in which they are drawn, and
-//! every page is walked away from the eye. Only in the eye's own row and column, which have land on both sides of
-//! the eye, is the direction that of the view; where some rays go against it, see [`order`](super::order).
+//! Rows of pages along the minor direction are walked outward from the eye's own row, and pages of a row outward from
+//! the eye's own column. Every ray from the eye therefore meets pages in the order in which they are drawn, and every
+//! page is walked away from the eye. The eye's own row and column have terrain on both sides of the eye; there the walk
+//! follows the view's direction. For rays against it see [`depth_sorter`](super::depth_sorter).
 
 use std::ops::Range;
 
@@ -11,19 +11,19 @@ use super::depth_sorter::Crossing;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
-/// The pages over a field.
+/// Grid of pages over a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Level of a quad that fills a page: a page has 2^level cells a side.
     pub level: u32,
-    /// Pages along (x, z); the last ones may stick out of the field.
+    /// Number of pages along (x, z). The last ones may extend beyond the field.
     pub count: [u32; 2],
-    /// The last sample of the field.
+    /// Last sample of the field.
     pub last: [i32; 2],
 }
 
 impl Grid {
-    /// Pages of at least 2^level cells a side, larger ones where there would be more than `max`.
+    /// Creates pages of at least 2^level cells a side; larger ones if there would be more than `max`.
     pub fn new(field: &Field, level: u32, max: u64) -> Self {
         let last = field.size().map(|n| n as i32 - 1);
         let count = |level: u32| last.map(|n| (n as u32).div_ceil(1 << level));
@@ -32,12 +32,12 @@ impl Grid {
         Self { level, count: count(level), last }
     }
 
-    /// Samples along a side of a page.
+    /// Returns the cells along a side of a page.
     pub fn side(&self) -> i32 {
         1 << self.level
     }
 
-    /// A page's place among all; `None` outside.
+    /// Returns the index of a page; `None` outside the grid.
     #[inline]
     pub fn index(&self, [x, z]: [i32; 2]) -> Option<usize> {
         let inside = x >= 0 && z >= 0 && (x as u32) < self.count[0] && (z as u32) < self.count[1];
@@ -45,22 +45,22 @@ impl Grid {
     }
 }
 
-/// The pages to be drawn.
+/// The set of pages to draw.
 #[derive(Clone, Debug)]
 pub struct Pages {
-    /// All of them.
+    /// Grid of all pages.
     pub grid: Grid,
     drawn: Vec<bool>,
     list: Vec<[i32; 2]>,
 }
 
 impl Pages {
-    /// None of them.
+    /// Creates an empty set.
     pub fn none(grid: Grid) -> Self {
         Self { grid, drawn: vec![false; (grid.count[0] * grid.count[1]) as usize], list: Vec::new() }
     }
 
-    /// Takes the pages in place of those before.
+    /// Replaces the set by these pages.
     pub fn set(&mut self, pages: impl IntoIterator<Item = [i32; 2]>) {
         for at in self.list.drain(..) {
             self.grid.index(at).into_iter().for_each(|k| self.drawn[k] = false);
@@ -73,32 +73,32 @@ impl Pages {
         }
     }
 
-    /// Those to be drawn.
+    /// Returns the pages to draw.
     pub fn list(&self) -> &[[i32; 2]] {
         &self.list
     }
 
-    /// Whether a page is to be drawn.
+    /// Returns true if a page is to be drawn.
     #[inline]
     pub fn is_drawn(&self, at: [i32; 2]) -> bool {
         self.grid.index(at).is_some_and(|k| self.drawn[k])
     }
 
-    /// The rows of pages to walk, nearest first.
+    /// Returns the rows of pages to walk, nearest first.
     pub fn rows(&self, traversal: &TraversalDirection) -> Vec<Row> {
         let (major, side) = (traversal.major, f64::from(self.grid.side()));
-        let wanted: Vec<bool> = (0..self.grid.count[major] as i32)
+        let drawn: Vec<bool> = (0..self.grid.count[major] as i32)
             .map(|row| (0..self.grid.count[1 - major] as i32).any(|n| self.is_drawn(placed(major, row, n))))
             .collect();
         let eye_row = (traversal.eye[major] / side).floor();
-        let outward = outward(eye_row, traversal.ahead[major], wanted.len() as i32);
-        let rows = outward.filter(|&(row, _)| wanted[row as usize]);
+        let outward = outward(eye_row, traversal.ahead[major], drawn.len() as i32);
+        let rows = outward.filter(|&(row, _)| drawn[row as usize]);
         rows.map(|(row, sign)| Row {
             row,
             sign,
             runs: self.runs(traversal, row),
             // The row behind the first one of each direction is drawn later, or is the first one.
-            has_behind: f64::from(row) != eye_row.clamp(0.0, (wanted.len() - 1) as f64),
+            has_behind: f64::from(row) != eye_row.clamp(0.0, (drawn.len() - 1) as f64),
         })
         .collect()
     }
@@ -121,17 +121,17 @@ impl Pages {
     }
 }
 
-/// A place by its coordinate along the major direction and along the other one.
+/// Returns a place from its coordinates along the major and the minor direction.
 #[inline]
 pub fn placed(major: usize, along: i32, across: i32) -> [i32; 2] {
     if major == 0 { [along, across] } else { [across, along] }
 }
 
-/// 0 to `count`, outward from where the eye is (or next to it): first in the direction of the view, then in the
-/// other; each with the direction away from the eye.
+/// Returns 0 to `count` outward from the eye's place or the nearest one: first in the direction of the view, then in
+/// the other. Each comes with the direction away from the eye.
 fn outward(eye: f64, ahead: i32, count: i32) -> impl Iterator<Item = (i32, i32)> {
     let own = eye.clamp(0.0, f64::from(count - 1)) as i32;
-    // Beside the field there is one direction only.
+    // An eye outside the field has one direction only.
     let ahead = if eye < 0.0 {
         1
     } else if eye > f64::from(count - 1) {
@@ -146,48 +146,48 @@ fn outward(eye: f64, ahead: i32, count: i32) -> impl Iterator<Item = (i32, i32)>
     to(own, ahead).chain(to(own - ahead, -ahead))
 }
 
-/// A row of pages and how it is walked.
+/// A row of pages, with the direction of its walk.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Its place along the major direction.
+    /// Index along the major direction.
     pub row: i32,
-    /// Whether it is walked towards greater positions (1) or smaller ones (−1).
+    /// Direction of the walk along the major axis: 1 towards greater positions, −1 towards smaller ones.
     pub sign: i32,
-    /// Pages side by side, each run from its first page on.
+    /// Runs of adjacent pages, each from its first page on.
     pub runs: Vec<Run>,
-    /// Whether the row behind it is drawn before it.
+    /// True if the row behind it is drawn before it.
     pub has_behind: bool,
 }
 
-/// Pages side by side.
+/// A run of adjacent pages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run {
-    /// The first one's place along the minor direction.
+    /// Index of the first page along the minor direction.
     pub first: i32,
-    /// How many.
+    /// Number of pages.
     pub pages: i32,
-    /// Whether they are walked towards greater positions (1) or smaller ones (−1).
+    /// Direction of the walk along the minor axis: 1 towards greater positions, −1 towards smaller ones.
     pub sign: i32,
 }
 
-/// Where the eye is over the lattice and where it looks: what the order depends on.
+/// Position of the eye over the lattice and direction of the view, which determine the order of the walk.
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalDirection {
-    /// The direction nearest the view's, along which strips follow each other: 0 along x, 1 along z.
+    /// Axis nearest the view's direction, along which strips follow each other: 0 for x, 1 for z.
     pub major: usize,
-    /// Where rays come from, samples. Parallel ones come from far away.
+    /// Origin of rays, samples. Parallel rays have a very distant one.
     pub eye: [f64; 2],
     /// Signs of the view's direction, ±1.
     pub ahead: [i32; 2],
-    /// Whether any ray goes the other way.
+    /// True for each axis along which some ray runs against the view's direction.
     pub against: [bool; 2],
 }
 
-/// Where parallel rays are said to come from, in the field's sizes.
+/// Distance of the origin of parallel rays, in the field's sizes.
 const FAR: f64 = 1e9;
 
 impl TraversalDirection {
-    /// That of a view of a field.
+    /// Computes the direction for a view of a field.
     pub fn new(field: &Field, view: &View) -> Self {
         let forward = [view.forward().x, view.forward().z];
         let extent_m = [0, 1].map(|k| field.spacing[k] * f64::from(field.size()[k])).into_iter().fold(0.0, f64::max);
@@ -203,7 +203,7 @@ impl TraversalDirection {
         Self { major: usize::from(forward[0].abs() <= forward[1].abs()), eye, ahead, against: against(view, ahead) }
     }
 
-    /// What the walk of a run is not away from, by its first corner and its directions along (minor, major).
+    /// Returns the rays against the walk of a run, given its first corner and its directions along (minor, major).
     pub fn crossing(&self, origin: [i32; 2], signs: [i32; 2]) -> Crossing {
         let axes = [1 - self.major, self.major];
         let eye = [0, 1].map(|k| f64::from(signs[k]) * (self.eye[axes[k]] - f64::from(origin[k])));
@@ -211,7 +211,8 @@ impl TraversalDirection {
     }
 }
 
-/// Whether any ray of a view goes against a direction: rays lie between those of the picture's corners.
+/// Returns true for each axis along which some ray runs against `ahead`. Rays lie between those of the picture's
+/// corners.
 fn against(view: &View, ahead: [i32; 2]) -> [bool; 2] {
     let Lens::Perspective { .. } = view.lens else { return [false; 2] };
     let half = view.size.map(|n| 0.5 * f64::from(n) / view.focal_px());
@@ -225,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_place_comes_once_and_outward() {
+    fn outward_visits_every_place_once() {
         for (eye, ahead, count) in [(3.0, 1, 8), (3.0, -1, 8), (-7.0, -1, 4), (99.0, 1, 5), (0.0, -1, 1)] {
             let places: Vec<_> = outward(eye, ahead, count).collect();
             let mut sorted: Vec<_> = places.iter().map(|p| p.0).collect();
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_end_where_pages_are_missing() {
+    fn runs_end_at_missing_pages() {
         let grid = Grid { level: 4, count: [9, 2], last: [140, 31] };
         let mut pages = Pages::none(grid);
         pages.set([0, 1, 3, 4, 5, 6, 8].map(|x| [x, 1]));

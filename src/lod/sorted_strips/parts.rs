@@ -1,22 +1,22 @@
-//! A frame in parts: what is walked first is drawn while the rest is walked.
+//! Divides a frame into parts: each part is drawn while the next one is walked.
 //!
-//! Rows of pages are walked and drawn in the same order as otherwise, a few at a time. What was given away to be drawn
-//! cannot be taken back, so that a frame comes in parts only where it surely fits its limits. On llvmpipe, where the device is
-//! the host's own cores, nothing is gained: 12 frames of 132 000 triangles, three rounds, medians of 16 to 26 ms whole, 20 to
-//! 23 in two parts, 17 to 28 in four, 17 to 30 in eight.
+//! Rows of pages are walked and drawn in the usual order, a few at a time. A part handed over for drawing cannot be
+//! taken back, so a frame is divided only if it is certain to fit the limits. On llvmpipe, which draws on the host's
+//! own cores, nothing is gained. Medians of 12 frames of 132 000 triangles, in three rounds: 16 to 26 ms whole. Two
+//! parts take 20 to 23 ms, four take 17 to 28 ms, eight take 17 to 30 ms.
 
 use super::pages::Row;
 use super::sequence::Sequence;
 use crate::draw::{Draw, DrawList, Instance};
 
-/// The most triangles of a frame of so many pages with so many split squares, and the most vertices: a page has four, a
-/// split adds at most the middles of a square and of its sides, there are less than twice as many triangles, and rows of
-/// pages have the vertices between them twice.
+/// Returns an upper bound on the triangles, and on the vertices, of a frame with these numbers of pages and split
+/// squares. A page has four vertices, and a split adds at most the middles of a square and of its sides. There are
+/// fewer than twice as many triangles, and rows of pages duplicate the vertices between them.
 pub fn max_triangles(pages: usize, splits: usize) -> usize {
     2 * (4 * pages + 5 * splits)
 }
 
-/// Rows in at most so many groups of about as many pages each, in the order in which they are drawn.
+/// Divides rows into at most `parts` groups with similar numbers of pages, in drawing order.
 pub fn groups(rows: &[Row], parts: usize, sequence: Sequence) -> Vec<&[Row]> {
     let pages = |row: &Row| row.runs.iter().map(|run| run.pages as usize).sum::<usize>();
     let all: usize = rows.iter().map(pages).sum();
@@ -31,7 +31,7 @@ pub fn groups(rows: &[Row], parts: usize, sequence: Sequence) -> Vec<&[Row]> {
         groups.extend((!group.is_empty()).then_some(group));
         rest = after;
     }
-    if sequence.is_from_afar() {
+    if sequence.is_back_to_front() {
         groups.reverse();
     }
     groups

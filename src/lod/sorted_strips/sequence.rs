@@ -1,7 +1,7 @@
-//! The order in which a frame's triangles are drawn. They are made nearest first; all other orders are of the same ones.
+//! Orders of a frame's triangles. They are generated nearest first; all orders contain the same triangles.
 //!
-//! Fragments that pass the depth test per covered pixel, over 1025 × 1025 samples at 1 px, 1280 × 720 pixels, 12 frames of
-//! each path:
+//! Fragments that pass the depth test per covered pixel, over 1025 × 1025 samples at 1 px, 1280 × 720 pixels, 12 frames
+//! of each path:
 //!
 //! | path | nearest first | shuffled | furthest first | brute force |
 //! |---|---|---|---|---|
@@ -9,32 +9,33 @@
 //! | skim | 1.000 | 1.496 | 2.496 | 1.234 |
 //! | corner | 1.000 | 1.100 | 1.233 | 1.000 |
 //!
-//! Triangles stay a list unless `topology=strip` says otherwise. Over a view of 464 711 triangles strips with restart break
-//! off after 1.97 triangles on average, as the order of sight goes to and fro: 16 % fewer indices, where indices of 16 bits
-//! take half the bytes. Rows of pages count from a first vertex of their own, so that their indices fit. On llvmpipe strips
-//! take 2.1 times the device's time (2049 × 2049 samples, circle, 1 px, 640 × 360, 795 000 triangles, medians of three
-//! rounds: 111 to 124 ms as a list, 221 to 252 ms as strips), and selection a tenth more.
+//! Triangles are a list by default and strips with `topology=strip`. In a view of 464 711 triangles, strips with
+//! restart end after 1.97 triangles on average, because front-to-back order alternates between neighbours. They save 16
+//! % of the indices; 16-bit indices would save half the bytes. Each row of pages has its own first vertex, so that its
+//! indices fit 16 bits. On llvmpipe strips take 2.1 times the device time: medians of three rounds are 111 to 124 ms as
+//! a list and 221 to 252 ms as strips. This was measured over 2049 × 2049 samples on the path `circle`, at 1 px, 640 ×
+//! 360 pixels and 795 000 triangles. Selection takes a tenth longer.
 
 use crate::draw::{DepthMode, DrawList};
 
 /// An order of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sequence {
-    /// A depth buffer refuses what is hidden before anything is computed for it.
+    /// Nearest first: the depth buffer rejects hidden fragments before they are shaded.
     NearestFirst,
-    /// The last triangle drawn shows.
+    /// Furthest first, with a depth buffer.
     FurthestFirst,
-    /// The same, and no depth buffer is used.
+    /// Furthest first, without a depth buffer (painter's algorithm).
     Painter,
-    /// No order at all: what the others are compared with.
+    /// Random order, as a baseline for comparison.
     Shuffled,
 }
 
 impl Sequence {
-    /// The words of the setting.
+    /// Words of the setting `order`.
     pub const WORDS: &[&str] = &["front", "back", "painter", "shuffled"];
 
-    /// What a word of the setting says.
+    /// Returns the order for a word of the setting.
     pub fn of(word: &str) -> Self {
         match word {
             "back" => Self::FurthestFirst,
@@ -44,21 +45,21 @@ impl Sequence {
         }
     }
 
-    /// What keeps hidden land out of the picture.
+    /// Returns the method of hiding surfaces.
     pub fn depth_mode(self) -> DepthMode {
         if self == Self::Painter { DepthMode::Painter } else { DepthMode::Buffer }
     }
 
-    /// Whether the furthest row comes first.
-    pub fn is_from_afar(self) -> bool {
+    /// Returns true if the furthest row comes first.
+    pub fn is_back_to_front(self) -> bool {
         matches!(self, Self::FurthestFirst | Self::Painter)
     }
 
-    /// Puts the triangles of a list, nearest first, in this order.
+    /// Rearranges the triangles of a list from nearest-first to this order.
     pub fn arrange(self, list: &mut DrawList) {
         match self {
             Self::NearestFirst => {}
-            Self::FurthestFirst | Self::Painter => turn_round(list),
+            Self::FurthestFirst | Self::Painter => reverse(list),
             Self::Shuffled => {
                 share_first_vertex(list);
                 shuffle(list.streamed.indices.as_chunks_mut().0);
@@ -67,16 +68,16 @@ impl Sequence {
     }
 }
 
-fn turn_round(list: &mut DrawList) {
+fn reverse(list: &mut DrawList) {
     let count = list.streamed.indices.len() as u32;
     list.streamed.indices.reverse();
-    // Each triangle's own three too: they turn as before.
+    // Restores the order of each triangle's three indices, so that its orientation is unchanged.
     list.streamed.indices.chunks_exact_mut(3).for_each(|t| t.reverse());
     list.draws.reverse();
     list.draws.iter_mut().for_each(|draw| draw.indices = count - draw.indices.end..count - draw.indices.start);
 }
 
-/// Lets the indices of all draws count from the same vertex.
+/// Rebases the indices of all draws to the same first vertex.
 fn share_first_vertex(list: &mut DrawList) {
     for draw in &mut list.draws {
         let indices = &mut list.streamed.indices[draw.indices.start as usize..draw.indices.end as usize];
@@ -85,7 +86,7 @@ fn share_first_vertex(list: &mut DrawList) {
     }
 }
 
-/// The same for the same triangles: each changes places with one of those before it.
+/// Deterministic Fisher–Yates shuffle.
 fn shuffle(triangles: &mut [[u32; 3]]) {
     let mut state = 1u64;
     for k in 1..triangles.len() {
@@ -99,7 +100,7 @@ mod tests {
     use super::*;
     use crate::draw::{Draw, Source, Topology};
 
-    /// Two draws of 40 and of 60 triangles, each of whose corners is a vertex of its own.
+    /// Returns two draws of 40 and of 60 triangles without shared vertices.
     fn list() -> DrawList {
         let mut list = DrawList::default();
         list.streamed.indices = (0..120).chain(0..180).collect();
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn every_word_is_an_order_of_its_own() {
+    fn words_map_to_distinct_orders() {
         let all: Vec<_> = Sequence::WORDS.iter().map(|word| Sequence::of(word)).collect();
         assert!(all.iter().enumerate().all(|(k, one)| !all[..k].contains(one)));
         let without = |word: &&&str| Sequence::of(word).depth_mode() == DepthMode::Painter;
@@ -129,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn turned_round_triangles_keep_their_draw_and_their_sense() {
+    fn reversed_triangles_keep_draw_and_orientation() {
         let list = arranged("back");
         let [far, near] = [0, 1].map(|k| list.draws[k].clone());
         assert_eq!((far.instances, far.indices, near.instances, near.indices), (1..2, 0..180, 0..1, 180..300));
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn shuffled_triangles_are_all_there_whole_and_far_from_where_they_were() {
+    fn shuffling_permutes_whole_triangles() {
         let list = arranged("shuffled");
         let firsts: Vec<u32> = list.streamed.indices.chunks(3).map(|t| t[0]).collect();
         assert!(list.streamed.indices.chunks(3).all(|t| t == [t[0], t[0] + 1, t[0] + 2] && t[0] % 3 == 0));

@@ -1,7 +1,8 @@
-//! The quads that a strip is made of: which triangles each has, and in which order they are seen.
+//! Triangles of each quad that a strip may contain, and their order of visibility.
 //!
-//! Walking to the right, the front at the bottom. A quad's front edge is whole, whatever comes in front of it; its
-//! back edge has the vertices of the front edges behind it; its sides have those of finer quads beside it.
+//! In the diagrams the walk goes to the right, with the front at the bottom. A quad's front edge has no middle,
+//! whatever follows in front of it. Its back edge has the vertices of the front edges behind it; its sides have those
+//! of finer quads beside it.
 //!
 //! ```text
 //!  a───────b   a───e───b   a───────────────b   a───────b   a───────b      a ──▸ minor direction
@@ -13,12 +14,12 @@
 //!                 behind       two advances        ahead      behind us: merging
 //! ```
 //!
-//! Every shape keeps A's diagonal, which is that of [`rtin`](crate::height::rtin) at the quad's level, and bisects a
-//! triangle from a middle on its side to the corner across: where the middle lies on the straight side, nothing
-//! changes. C's lines meet where those of its two quads do. Where a quad has finer ones on two or three of its sides,
-//! B, D and E are combined: that happens wherever a border between two levels turns a corner.
+//! Every shape keeps A's diagonal, which is that of [`rtin`](crate::height::rtin) at the quad's level. A middle on a
+//! triangle's side bisects the triangle towards the opposite corner. If the middle lies exactly on the straight side,
+//! the surface does not change. C's lines meet where the diagonals of its two quads do. B, D and E are combined where a
+//! quad has finer ones on two or three sides, wherever a border between two levels turns a corner.
 
-/// Vertices of a quad: corners, middles of three sides, and the middle of the front edge of C.
+/// Vertex slots of a quad: corners, middles of three sides, and the middle of the front edge of C.
 pub mod slot {
     /// Trailing corner behind.
     pub const A: usize = 0;
@@ -39,34 +40,34 @@ pub mod slot {
 }
 use slot::{A, B, C, D, E, F, G, M};
 
-/// The back edge has a middle.
+/// Bit of a quad whose back edge has a middle.
 pub const BACK: usize = 1;
-/// The trailing side has a middle.
+/// Bit of a quad whose trailing side has a middle.
 pub const TRAILING: usize = 2;
-/// The leading side has a middle.
+/// Bit of a quad whose leading side has a middle.
 pub const LEADING: usize = 4;
 
 /// Number of combinations of middles.
 const MASKS: usize = 8;
 
-/// Where slots lie, (along the strip, forward).
+/// Positions of the slots, (along the strip, forward).
 pub type Places = [[f64; 2]; 8];
 
-/// Where the vertices of a quad lie, in half sides.
+/// Positions of a quad's slots, in half sides.
 const PLACES: Places = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [1.0, 0.0], [0.0, 1.0], [2.0, 1.0], [1.0, 2.0]];
-/// Where those of C lie, in half sides of its two finer halves.
+/// Positions of C's slots, in half sides of its two finer halves.
 const PAIR_PLACES: Places =
     [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [2.0, 2.0]];
 
 /// One kind of quad.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// Triangles as vertices' slots; they face up where x is along the strip and z forward.
+    /// Triangles as vertex slots. They face up if x is along the strip and z forward.
     pub triangles: Vec<[usize; 3]>,
-    /// Where slots lie, half sides.
+    /// Positions of the slots, in half sides.
     pub places: &'static Places,
-    /// Triangles side by side, and the line between them, with the first triangle on the side where
-    /// [`side`] is positive.
+    /// Pairs of adjacent triangles with the line between them; the first triangle is on the side where [`side`] is
+    /// positive.
     seams: Vec<Seam>,
 }
 
@@ -79,7 +80,7 @@ struct Seam {
 
 /// All kinds of quads.
 pub struct Shapes {
-    /// By middles, with one diagonal and with the other.
+    /// By combination of middles, with one diagonal and then with the other.
     single: Vec<Shape>,
     pair: Shape,
 }
@@ -93,26 +94,26 @@ impl Default for Shapes {
 }
 
 impl Shapes {
-    /// The quad with these middles; `rising`: its diagonal goes from B to D rather than from A to C.
+    /// Returns the quad with these middles. With `rising` its diagonal is from B to D, otherwise from A to C.
     #[inline]
     pub fn single(&self, middles: usize, rising: bool) -> &Shape {
         &self.single[middles + if rising { MASKS } else { 0 }]
     }
 
-    /// Two quads side by side that match one coarser front edge.
+    /// Returns two adjacent quads that match one coarser front edge.
     #[inline]
     pub fn pair(&self) -> &Shape {
         &self.pair
     }
 
-    /// Quads of one kind of diagonal.
+    /// Returns all quads with one of the diagonals.
     pub fn singles(&self, rising: bool) -> &[Shape] {
         let first = if rising { MASKS } else { 0 };
         &self.single[first..first + MASKS]
     }
 }
 
-/// The two triangles of a plain quad, each bisected from a middle on its side to the corner across from it.
+/// Returns the two triangles of a plain quad, each bisected from a middle on its side to the opposite corner.
 fn triangles(middles: usize, rising: bool) -> Vec<[usize; 3]> {
     let middle = |bit: usize, slot: usize| (middles & bit != 0).then_some(slot);
     let [e, f, g] = [middle(BACK, E), middle(TRAILING, F), middle(LEADING, G)];
@@ -122,7 +123,7 @@ fn triangles(middles: usize, rising: bool) -> Vec<[usize; 3]> {
     }
 }
 
-/// A triangle with middles on its first and its second side, or without.
+/// Returns a triangle bisected at optional middles of its first and its second side.
 fn bisected([p, q, r]: [usize; 3], first: Option<usize>, second: Option<usize>) -> Vec<[usize; 3]> {
     match (first, second) {
         (None, None) => vec![[p, q, r]],
@@ -151,20 +152,20 @@ impl Shape {
         Self { triangles, places, seams }
     }
 
-    /// A triangle's corners, half sides.
+    /// Returns a triangle's corners, in half sides.
     pub fn corners(&self, triangle: [usize; 3]) -> [[i32; 2]; 3] {
         triangle.map(|slot| self.places[slot].map(|n| n as i32))
     }
 
-    /// Calls `visit` for each triangle, nearest first along every ray from `eye`, where slots lie at `places`: of two
-    /// triangles side by side the one on the eye's side of the line between them comes first.
+    /// Calls `visit` for each triangle, nearest first along every ray from `eye`, with the slots at `places`. Of two
+    /// adjacent triangles, the one on the eye's side of the line between them comes first.
     #[inline]
     pub fn visit_in_order(&self, places: &Places, eye: [f64; 2], mut visit: impl FnMut([usize; 3])) {
         let in_order = |seam: &Seam| {
             let first_is_nearer = side(seam.line.map(|slot| places[slot]), eye) >= 0.0;
             if first_is_nearer { [seam.first, seam.second] } else { [seam.second, seam.first] }
         };
-        // Most quads are plain.
+        // Fast path for plain quads, the most frequent kind.
         if let [seam] = &self.seams[..] {
             return in_order(seam).into_iter().for_each(|k| visit(self.triangles[k]));
         }
@@ -172,7 +173,7 @@ impl Shape {
         for [near, far] in self.seams.iter().map(in_order) {
             behind[far] |= 1 << near;
         }
-        // The triangles and their seams form a tree: in each round one is free.
+        // Triangles and seams form a tree, so each round has a triangle with nothing left in front of it.
         let mut pending = (1u8 << self.triangles.len()) - 1;
         while pending != 0 {
             for (k, triangle) in self.triangles.iter().enumerate() {
@@ -185,7 +186,7 @@ impl Shape {
     }
 }
 
-/// Positive on one side of a line, negative on the other.
+/// Returns the signed area that is positive on one side of a line and negative on the other.
 #[inline]
 fn side([from, to]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
     (to[0] - from[0]) * (point[1] - from[1]) - (to[1] - from[1]) * (point[0] - from[0])
@@ -216,10 +217,10 @@ mod tests {
     }
 
     #[test]
-    fn each_shape_has_the_middles_it_is_named_by_and_no_others() {
+    fn shapes_have_exactly_their_middles() {
         let shapes = Shapes::default();
         for (middles, rising) in (0..MASKS).flat_map(|k| [(k, false), (k, true)]) {
-            // Nothing changes where middles lie on straight sides.
+            // The surface does not change if middles lie on straight sides.
             let plain: Vec<_> = shapes.single(0, rising).triangles.clone();
             let holds = |plain: &[usize; 3], triangle: &[usize; 3]| {
                 let corners = plain.map(|slot| PLACES[slot]);
@@ -234,7 +235,7 @@ mod tests {
         }
     }
 
-    /// Along rays from an eye anywhere, triangles are met in the order of the visits.
+    /// Along rays from random eyes, triangles are met in the order of the visits.
     #[test]
     fn triangles_come_nearest_first() {
         for shape in all() {
@@ -242,7 +243,7 @@ mod tests {
                 let random = |n: u32| f64::from((k * 4 + n).wrapping_mul(0x9e37_79b1) >> 8) / f64::from(1 << 24);
                 let eye = [random(0) * 12.0 - 5.0, random(1) * 12.0 - 5.0];
                 let towards = [random(2) * 4.0 - eye[0], random(3) * 2.0 - eye[1]];
-                let mut met = Vec::new();
+                let mut distances = Vec::new();
                 shape.visit_in_order(shape.places, eye, |triangle| {
                     let corners = shape.corners(triangle).map(|p| p.map(f64::from));
                     let steps = (0..600).map(|n| f64::from(n) / 200.0);
@@ -250,9 +251,9 @@ mod tests {
                         let p = [eye[0] + t * towards[0], eye[1] + t * towards[1]];
                         (0..3).all(|n| side([corners[n], corners[(n + 1) % 3]], p) < -1e-9)
                     };
-                    met.extend(steps.clone().find(inside));
+                    distances.extend(steps.clone().find(inside));
                 });
-                assert!(met.is_sorted(), "{:?} from {eye:?}: {met:?}", shape.triangles);
+                assert!(distances.is_sorted(), "{:?} from {eye:?}: {distances:?}", shape.triangles);
             }
         }
     }

@@ -1,25 +1,26 @@
-//! Which squares may not be drawn as one quad: the restricted quadtree that strips are walked over, as bits.
+//! Set of split squares: the restricted quadtree that strips are walked over, stored as bits.
 //!
-//! A square of level l has a side of 2^l samples. A set of split squares is *closed* if squares that touch, at a
-//! corner too, are drawn within one level of each other. That is the Lipschitz condition of Finch & Bishop's level
-//! function (§4.5), and [`Splits::close`] repairs a set that breaks it by splitting more.
+//! A square of level l has a side of 2^l samples; a *split* square is drawn by finer quads. A set is *closed* if
+//! squares that touch, also at a corner, are drawn within one level of each other. This is the Lipschitz condition of
+//! Finch & Bishop's level function (§4.5). [`Splits::close`] establishes it by splitting more squares.
 
 use std::collections::HashMap;
 
 use super::pages::{Grid, Pages};
 
-/// Words of a page that are held side by side, at most: 4 MiB, for pages of 4096 samples a side. Of larger pages, which only
-/// fields of millions of samples a side have, the words that are not 0 are held.
+/// Maximum number of words of a page in dense storage: 4 MiB, for pages of 4096 samples a side. Larger pages, which
+/// only fields of millions of samples a side have, use sparse storage.
 const MAX_PAGE_WORDS: usize = 1 << 19;
 
-/// What strips ask of a level function.
+/// A level function.
 pub trait Levels: Sync {
-    /// Whether a square of a level is to be drawn by quads of finer levels. True of every square that a split one
-    /// lies in or, one level below, touches; level 0 is never split.
+    /// Returns true if a square of a level is to be drawn by quads of finer levels. Must be true for every square that
+    /// contains a split one, or that touches a split one of the level below. Level 0 is never split.
     fn is_split(&self, level: u32, at: [i32; 2]) -> bool;
 
-    /// How far the vertex at a position has gone to its place in the next level, 0 to 1, if `level` is the coarsest that
-    /// has it. It must be 1 where a square of the next level around it, or with it on its side, is not split.
+    /// Returns the morph weight, 0 to 1, of the vertex at a position towards its place in the next level; `level` is
+    /// the coarsest level that has the vertex. Must be 1 if a square of the next level that contains or touches it is
+    /// not split.
     fn weight(&self, _level: u32, _at: [i32; 2]) -> f32 {
         0.0
     }
@@ -28,23 +29,23 @@ pub trait Levels: Sync {
 /// A set of split squares.
 pub struct Splits {
     grid: Grid,
-    /// By page: where its bits begin in `words`, and one; 0 if none of them is set.
+    /// Position of each page's bits in `words`, plus one; 0 if none of them is set.
     places: Vec<u32>,
     words: Vec<u64>,
-    /// By page and word, in place of `words` where pages are large.
+    /// Nonzero words by page and word index, used instead of `words` for large pages.
     sparse: HashMap<(u32, usize), u64>,
     words_per_page: usize,
-    /// By level: the first bit in a page.
+    /// First bit in a page, by level.
     first_bits: Vec<usize>,
-    /// By level.
+    /// Split squares by level.
     lists: Vec<Vec<[i32; 2]>>,
 }
 
 impl Splits {
-    /// No square is split.
+    /// Creates an empty set.
     pub fn new(grid: Grid) -> Self {
         let bits = |level: u32| 1usize << (2 * (grid.level - level));
-        // From the page down, level 0 excepted.
+        // From the page down; level 0 has no bits.
         let mut first_bits = vec![0; grid.level as usize + 1];
         (1..grid.level as usize).rev().for_each(|l| first_bits[l] = first_bits[l + 1] + bits(l as u32 + 1));
         let words_per_page = (first_bits.get(1).copied().unwrap_or(0) + bits(1)).div_ceil(64);
@@ -67,12 +68,12 @@ impl Splits {
         self.sparse.clear();
     }
 
-    /// How many squares are split.
+    /// Returns the number of split squares.
     pub fn count(&self) -> usize {
         self.lists.iter().map(Vec::len).sum()
     }
 
-    /// Word and bit of a square in its page.
+    /// Returns the word and the bit of a square in its page.
     #[inline]
     fn bit(&self, level: u32, at: [i32; 2]) -> (usize, u64) {
         let above = self.grid.level - level;
@@ -81,7 +82,7 @@ impl Splits {
         (bit / 64, 1 << (bit % 64))
     }
 
-    /// Splits a square in a page to be drawn; `false` if it was split before, or is in no such page.
+    /// Splits a square of a page to be drawn. Returns false if it was split before, or its page is not drawn.
     pub fn insert(&mut self, pages: &Pages, level: u32, at: [i32; 2]) -> bool {
         let page = at.map(|n| n >> (self.grid.level - level));
         let Some(k) = self.grid.index(page).filter(|_| pages.is_drawn(page)) else { return false };
@@ -104,8 +105,8 @@ impl Splits {
         true
     }
 
-    /// Splits what is needed for the set to be closed: from the finest level up, the square that each split one lies
-    /// in, and the three others of that level that it touches. It reaches less than a page beyond a split square.
+    /// Closes the set: from the finest level up, splits the parent of each split square and the three other squares of
+    /// the parent's level that it touches. This extends less than a page beyond a split square.
     pub fn close(&mut self, pages: &Pages) {
         for level in 1..self.grid.level {
             let mut k = 0;
@@ -148,7 +149,7 @@ mod tests {
         pages
     }
 
-    /// Level of the quad over a cell.
+    /// Returns the level of the quad over a cell.
     fn level(splits: &Splits, [x, z]: [i32; 2]) -> u32 {
         (0..GRID.level)
             .rev()
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn clearing_leaves_nothing() {
+    fn clear_empties_the_set() {
         let pages = everywhere();
         let mut splits = Splits::new(GRID);
         assert!(splits.insert(&pages, 1, [9, 9]) && !splits.insert(&pages, 1, [9, 9]));

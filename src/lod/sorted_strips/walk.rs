@@ -1,6 +1,7 @@
-//! The walk: one row of pages, strip by strip, quad by quad, nearest first (Finch & Bishop, §4.4 to 4.7).
+//! Walks one row of pages, strip by strip and quad by quad, nearest first (Finch & Bishop, §4.4 to 4.7).
 //!
-//! A strip steps along the minor direction (`u`, to the right below), its front edge on one line of constant `v`:
+//! A strip steps along the minor direction (`u`, to the right in the diagram) with its front edge on a line of constant
+//! `v`:
 //!
 //! ```text
 //!   ┌───────┬───────┐ · · behind: strips walked before       ─▸ u
@@ -10,20 +11,20 @@
 //!   └───────┴───┴───┘ front edge: stays where it is
 //! ```
 //!
-//! - **Split.** Where the square ahead is split, the quad before it is drawn with a middle on its leading side (D), a
-//!   strip of half the size fills the rear half as far as it can, and the strip goes on with half the step in the front
-//!   half. A page is begun as one strip of its own size, which splits at once where it must: that is the published
-//!   start of strips (§4.7).
-//! - **End.** A rear strip ends at the first place where the quad of twice its size need not be split: it could only
-//!   grow forward.
-//! - **Merge.** There the strip in front of it doubles its step: its next quad reaches back over both (E).
-//! - **Match.** In front of a quad of twice the size, two quads are drawn at once (C), which leave out the vertex that
-//!   its front edge has not. In front of quads of half the size the vertex between them is added (B).
+//! - **Split.** If the square ahead is split, the quad before it is drawn with a middle on its leading side (D). A
+//!   strip of half the size fills the rear half as far as it can. The main strip continues in the front half with half
+//!   the step. A page begins as one strip of its own size, which splits at once if needed: the published start of
+//!   strips (§4.7).
+//! - **End.** A rear strip ends at the first place where the quad of twice its size need not be split, because it could
+//!   only grow forward.
+//! - **Merge.** There the strip in front of it doubles its step: its next quad covers both (E).
+//! - **Match.** In front of a quad of twice the size, two quads are drawn at once (C), without the middle vertex that
+//!   its front edge lacks. In front of quads of half the size the vertex between them is added (B).
 //!
-//! Which vertices are behind is asked of a line of marks: for each `u` the last `v` at which a vertex was used. It is
-//! the published map of vertices by frame, which needs one entry for each column only, as no strip looks further back.
-//! Rows of pages are walked independently: the front edge of the row behind follows from the level function, and its
-//! vertices are made again, as the paper copies them from page to page.
+//! Vertices behind a strip are found in an array of marks: for each `u`, the last `v` at which a vertex was used. This
+//! is the published map of vertices by frame, reduced to one entry per column, because no strip looks further back.
+//! Rows of pages are walked independently. The front edge of the row behind follows from the level function. Its
+//! vertices are generated again, as the paper copies them from page to page.
 
 use super::blend::Blend;
 use super::depth_sorter::{Crossing, DepthSorter};
@@ -38,12 +39,12 @@ use crate::height::Field;
 pub struct Stream {
     /// Vertices, each once.
     pub vertices: Vec<ExplicitVertex>,
-    /// Three a triangle, nearest first, counted from the first vertex of their row.
+    /// Three indices per triangle, nearest first, relative to the first vertex of their row.
     pub indices: Vec<u32>,
 }
 
 impl Stream {
-    /// How many vertices and indices it has.
+    /// Returns the number of vertices and of indices.
     pub fn lengths(&self) -> [usize; 2] {
         [self.vertices.len(), self.indices.len()]
     }
@@ -55,35 +56,35 @@ impl Stream {
     }
 }
 
-/// What walking a row needs and leaves: kept from frame to frame, it allocates nothing.
+/// Buffers for walking rows, reused from frame to frame without allocation.
 #[derive(Default)]
 pub struct Worker {
-    /// What was walked: rows follow each other in it until it is taken or cleared.
+    /// Output. Rows are appended until it is taken or cleared.
     pub stream: Stream,
     marks: Vec<Mark>,
     start: Vec<u32>,
     sorter: DepthSorter,
 }
 
-/// What every row of a frame is walked with.
+/// Inputs shared by the walks of all rows of a frame.
 pub struct WalkContext<'a, L> {
-    /// The field.
+    /// Heights.
     pub field: &'a Field,
-    /// The pages to be drawn.
+    /// Pages to draw.
     pub pages: &'a Pages,
-    /// The level function.
+    /// Level function.
     pub levels: &'a L,
     /// All kinds of quads.
     pub shapes: &'a Shapes,
-    /// Where the eye is and looks.
+    /// Position of the eye and direction of the view.
     pub traversal: TraversalDirection,
-    /// How vertices go over into the next level.
+    /// Morph of vertices to the next level.
     pub blend: Blend,
 }
 
-/// A vertex that is used but not made yet.
-const UNMADE: u32 = u32::MAX;
-/// No vertex is used in a column.
+/// A vertex that is used but not generated yet.
+const NO_VERTEX: u32 = u32::MAX;
+/// Mark of a column without a used vertex.
 const UNUSED: i32 = -1;
 
 /// The last vertex used in a column.
@@ -106,7 +107,7 @@ impl Square {
         Square { level: self.level + 1, column: self.column >> 1, row: self.row >> 1 }
     }
 
-    /// One of the two children at the trailing side.
+    /// Returns one of the two children at the trailing side.
     fn child(self, is_front: bool) -> Square {
         Square { level: self.level - 1, column: 2 * self.column, row: 2 * self.row + i32::from(is_front) }
     }
@@ -116,7 +117,7 @@ impl Square {
     }
 }
 
-/// The vertices of a quad's trailing side.
+/// Vertices of a quad's trailing side.
 #[derive(Clone, Copy)]
 struct Side {
     back: u32,
@@ -124,31 +125,31 @@ struct Side {
     front: u32,
 }
 
-/// The run that is being walked.
+/// State of the walk of one run.
 struct Walk<'a, L> {
     context: &'a WalkContext<'a, L>,
     stream: Stream,
-    /// The row's first vertex in the stream: indices count from it.
+    /// First vertex of the row in the stream, from which indices count.
     first_vertex: usize,
-    /// The first corner: on the line behind the row, at the run's first side.
+    /// First corner: on the line behind the row, at the run's first side.
     origin: [i32; 2],
     /// Steps along the minor and the major direction, ±1.
     signs: [i32; 2],
-    /// Where rays come from, counted from the first corner, and which of them the walk is not away from.
+    /// Origin of rays relative to the first corner, and the rays against the walk.
     crossing: Crossing,
     sorter: DepthSorter,
-    /// Length of the run.
+    /// Length of the run, samples.
     length: i32,
-    /// By column.
+    /// Marks by column.
     marks: Vec<Mark>,
     /// Vertices on the run's first side.
     start: Vec<u32>,
     has_behind: bool,
-    /// Whether the page beside the first one is drawn too.
+    /// True if the page beside the first one is drawn too.
     has_beside: bool,
-    /// Whether (u, v) turns the other way than (x, z).
+    /// True if (u, v) has the opposite orientation to (x, z).
     mirrored: bool,
-    /// Whether vertices may lie elsewhere than in their shape: the run sticks out of the field, or they slide.
+    /// True if vertices may differ from their places in the shape: the run extends beyond the field, or vertices slide.
     is_moved: bool,
 }
 
@@ -182,8 +183,8 @@ impl<L: Levels> WalkContext<'_, L> {
             is_moved: false,
         };
         // Each run fills its own part of the marks.
-        walk.marks.resize((longest as usize + 1).max(walk.marks.len()), Mark { v: UNUSED, vertex: UNMADE });
-        walk.start.resize(side as usize + 1, UNMADE);
+        walk.marks.resize((longest as usize + 1).max(walk.marks.len()), Mark { v: UNUSED, vertex: NO_VERTEX });
+        walk.start.resize(side as usize + 1, NO_VERTEX);
         let mut last_start = None;
         for run in &row.runs {
             walk.origin[0] = behind(run.sign, run.first);
@@ -192,7 +193,7 @@ impl<L: Levels> WalkContext<'_, L> {
             walk.crossing = self.traversal.crossing(walk.origin, walk.signs);
             // Two runs away from the same side share its vertices.
             if last_start != Some(walk.origin[0]) {
-                walk.start.fill(UNMADE);
+                walk.start.fill(NO_VERTEX);
             }
             last_start = Some(walk.origin[0]);
             walk.run(row, run);
@@ -214,7 +215,7 @@ impl<L: Levels> Walk<'_, L> {
             end * pages.grid.side() > pages.grid.last[k]
         });
         self.is_moved = sticks_out || matches!(self.context.blend, Blend::End(_));
-        self.marks[..=self.length as usize].fill(Mark { v: UNUSED, vertex: UNMADE });
+        self.marks[..=self.length as usize].fill(Mark { v: UNUSED, vertex: NO_VERTEX });
         for n in 0..run.pages {
             if row.has_behind && pages.is_drawn(page(row.row - row.sign, run.first + n * run.sign)) {
                 self.mark_behind(Square { level, column: n, row: -1 });
@@ -238,17 +239,16 @@ impl<L: Levels> Walk<'_, L> {
         }
     }
 
-    /// Draws a strip from a square on; its last back vertex. What it does at each square is the published pseudocode
-    /// of §4.6.
+    /// Draws a strip from a square on and returns its last back vertex. Each step is the published pseudocode of §4.6.
     fn strip(&mut self, mut square: Square, mut side: Side) -> u32 {
-        // By level: where the rear strip of that level ended that lies behind this one.
-        let mut ended = [UNMADE; 32];
+        // By level: the last vertex of the rear strip of that level behind this one.
+        let mut rear_ends = [NO_VERTEX; 32];
         while square.column << square.level < self.length {
             if self.is_parent_whole(square) {
                 if square.row & 1 == 0 {
                     return side.back;
                 }
-                side = Side { back: ended[square.level as usize], middle: Some(side.back), front: side.front };
+                side = Side { back: rear_ends[square.level as usize], middle: Some(side.back), front: side.front };
                 square = square.parent();
             }
             if square.column == 0 {
@@ -256,7 +256,7 @@ impl<L: Levels> Walk<'_, L> {
             }
             if let (true, Some(middle)) = (self.is_split(square), side.middle) {
                 let rear = Side { back: side.back, middle: None, front: middle };
-                ended[square.level as usize - 1] = self.strip(square.child(false), rear);
+                rear_ends[square.level as usize - 1] = self.strip(square.child(false), rear);
                 side = Side { back: middle, middle: None, front: side.front };
                 square = square.child(true);
             } else if self.matches_coarser(square) {
@@ -270,14 +270,14 @@ impl<L: Levels> Walk<'_, L> {
         side.back
     }
 
-    /// Whether the square of twice the size that begins here need not be split.
+    /// Returns true if the square of twice the size that begins here need not be split.
     #[inline]
     fn is_parent_whole(&self, square: Square) -> bool {
         square.column & 1 == 0 && square.level < self.context.pages.grid.level && !self.is_split(square.parent())
     }
 
-    /// Whether the edge behind is that of a quad of twice the size: its front edge lacks the vertex between this
-    /// square and the next.
+    /// Returns true if the edge behind is that of a quad of twice the size, whose front edge lacks the vertex between
+    /// this square and the next.
     #[inline]
     fn matches_coarser(&self, square: Square) -> bool {
         let (u, v) = ((square.column + 1) << square.level, square.row << square.level);
@@ -285,8 +285,8 @@ impl<L: Levels> Walk<'_, L> {
         begins && self.marks[u as usize].v != v && self.has_terrain_behind(u, v)
     }
 
-    /// Whether there is a quad behind a column of a strip: beyond the field's edge all are flat, and the page behind
-    /// the row may not be drawn, or later.
+    /// Returns true if there is a quad behind a column of a strip. Beyond the field's edge all quads are flat, and the
+    /// page behind the row may not be drawn, or only later.
     #[inline]
     fn has_terrain_behind(&self, u: i32, v: i32) -> bool {
         let Pages { grid, .. } = self.context.pages;
@@ -299,7 +299,7 @@ impl<L: Levels> Walk<'_, L> {
         self.has_behind && self.context.pages.is_drawn([x >> grid.level, z >> grid.level])
     }
 
-    /// The middle of a square's side on the run's first side, if either of its two squares is split.
+    /// Returns the middle of a square's side on the run's first side, if either of the two adjacent squares is split.
     fn start_middle(&mut self, square: Square) -> Option<u32> {
         let is_needed = self.is_split(square) || self.has_beside && self.is_split(square.step(-1));
         is_needed.then(|| self.start_vertex((2 * square.row + 1) << (square.level - 1)))
@@ -318,9 +318,9 @@ impl<L: Levels> Walk<'_, L> {
         let front = self.front_vertex(u + size, v + size);
         let middles = [(middle_behind, BACK), (trailing.middle, TRAILING), (middle, LEADING)];
         let mask = middles.iter().map(|(middle, bit)| if middle.is_some() { *bit } else { 0 }).sum();
-        let [e, f, g] = middles.map(|(middle, _)| middle.unwrap_or(UNMADE));
+        let [e, f, g] = middles.map(|(middle, _)| middle.unwrap_or(NO_VERTEX));
         let shape = self.context.shapes.single(mask, self.is_rising(square));
-        self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, UNMADE], square, false);
+        self.push(shape, [trailing.back, back, front, trailing.front, e, f, g, NO_VERTEX], square, false);
         Side { back, middle, front }
     }
 
@@ -332,14 +332,14 @@ impl<L: Levels> Walk<'_, L> {
         let back = self.behind(u + 2 * size, v).unwrap_or_else(|| self.vertex(u + 2 * size, v));
         let middle = self.front_vertex(u + size, v + size);
         let front = self.front_vertex(u + 2 * size, v + size);
-        let mut slots = [UNMADE; 8];
+        let mut slots = [NO_VERTEX; 8];
         slots[..4].copy_from_slice(&[trailing.back, back, front, trailing.front]);
         slots[slot::M] = middle;
         self.push(self.context.shapes.pair(), slots, square, true);
         Side { back, middle: None, front }
     }
 
-    /// The triangles of a quad, nearest first.
+    /// Appends the triangles of a quad, nearest first.
     #[inline]
     fn push(&mut self, shape: &Shape, slots: [u32; 8], square: Square, is_pair: bool) {
         let Square { level, column, row } = square;
@@ -360,7 +360,7 @@ impl<L: Levels> Walk<'_, L> {
         });
     }
 
-    /// The same where vertices may lie elsewhere than in their shape: triangles without area are left out.
+    /// The same for vertices that may differ from their places in the shape; omits triangles without area.
     #[cold]
     fn push_moved(&mut self, shape: &Shape, slots: [u32; 8], [u, v]: [i32; 2], size: i32, eye: [f64; 2]) {
         let (major, unit) = (self.context.traversal.major, f64::from(1 << self.context.blend.fraction_bits()));
@@ -373,7 +373,7 @@ impl<L: Levels> Walk<'_, L> {
             };
             [along(0, vertex.position[1 - major], u), along(1, vertex.position[major], v)]
         };
-        // Slots that the shape has not are none of a vertex.
+        // Slots that the shape does not use have no vertex.
         let places = slots.map(|slot| vertices.get(slot as usize).map_or([0.0; 2], place));
         shape.visit_in_order(&places, eye, |[a, b, c]| {
             let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|slot| slots[slot]);
@@ -383,7 +383,7 @@ impl<L: Levels> Walk<'_, L> {
         });
     }
 
-    /// Whether the diagonal goes from B to D, see [`rtin`](crate::height::rtin).
+    /// Returns true if the diagonal is from B to D, see [`rtin`](crate::height::rtin).
     #[inline]
     fn is_rising(&self, square: Square) -> bool {
         let [x, z] = self.world(square);
@@ -395,7 +395,7 @@ impl<L: Levels> Walk<'_, L> {
         self.context.levels.is_split(square.level, self.world(square))
     }
 
-    /// A square's place on the lattice.
+    /// Returns a square's place on the lattice.
     #[inline]
     fn world(&self, square: Square) -> [i32; 2] {
         let place = |k: usize, n: i32| {
@@ -405,20 +405,20 @@ impl<L: Levels> Walk<'_, L> {
         placed(self.context.traversal.major, place(1, square.row), place(0, square.column))
     }
 
-    /// The vertex behind, if it is used.
+    /// Returns the vertex behind a position, if one is used there.
     #[inline]
     fn behind(&mut self, u: i32, v: i32) -> Option<u32> {
         let mark = self.marks[u as usize];
         if mark.v != v {
             return None;
         }
-        if mark.vertex == UNMADE {
+        if mark.vertex == NO_VERTEX {
             self.marks[u as usize].vertex = self.vertex(u, v);
         }
         Some(self.marks[u as usize].vertex)
     }
 
-    /// A new vertex on the strip's front edge.
+    /// Generates a vertex on the strip's front edge.
     #[inline]
     fn front_vertex(&mut self, u: i32, v: i32) -> u32 {
         let vertex = self.vertex(u, v);
@@ -427,13 +427,13 @@ impl<L: Levels> Walk<'_, L> {
     }
 
     fn start_vertex(&mut self, v: i32) -> u32 {
-        if self.start[v as usize] == UNMADE {
+        if self.start[v as usize] == NO_VERTEX {
             self.start[v as usize] = self.vertex(0, v);
         }
         self.start[v as usize]
     }
 
-    /// A new vertex: what sticks out of the field collapses onto its edge.
+    /// Generates a vertex. Vertices beyond the field collapse onto its edge.
     #[inline]
     fn vertex(&mut self, u: i32, v: i32) -> u32 {
         let [u, v] = [self.origin[0] + self.signs[0] * u, self.origin[1] + self.signs[1] * v];
@@ -444,7 +444,7 @@ impl<L: Levels> Walk<'_, L> {
     }
 }
 
-/// Whether a triangle has any area in plan.
+/// Returns true if a triangle has any area in plan.
 fn has_area(vertices: &[ExplicitVertex], triangle: [u32; 3]) -> bool {
     let [a, b, c] = triangle.map(|k| vertices[k as usize].position.map(i64::from));
     (b[1] - a[1]) * (c[0] - a[0]) != (b[0] - a[0]) * (c[1] - a[1])

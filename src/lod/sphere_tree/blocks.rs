@@ -1,8 +1,8 @@
-//! Squares of the field with the ranges of their heights: what is in sight is told by them.
+//! Culls the field by square blocks with precomputed height ranges.
 //!
-//! They are the same at every tolerance, so that a wider one never draws more. A wedge larger than a block is drawn if
-//! it covers any block in sight. Where vertices collapse onto the field's edge, a wedge covers other blocks than its halves
-//! do. All of these lie in one square ([`Lattice::edge_side`]), which is culled and drawn as one block.
+//! Blocks are the same at every tolerance, so a greater tolerance never draws more. A wedge larger than a block is
+//! drawn if it covers any visible block. Where vertices collapse onto the field's edge, a wedge covers other blocks
+//! than its halves do. All of these lie in one square ([`Lattice::edge_side`]), which is culled and drawn as one block.
 
 use rayon::prelude::*;
 
@@ -11,35 +11,35 @@ use crate::height::Field;
 use crate::height::surface::has_terrain;
 use crate::view::{Aabb, Containment, View};
 
-/// A unit of culling and drawing: a block, or a square that the field's edge crosses.
+/// A unit of culling and drawing: a block, or a square of blocks that the field's edge crosses.
 #[derive(Clone, Copy)]
 struct Square {
-    /// Its first block.
+    /// Index of its first block.
     first: usize,
     /// Cells along its side.
     side: i32,
 }
 
-/// The blocks of a field.
+/// Blocks of a field.
 #[derive(Default)]
 pub struct Blocks {
-    /// Side of a block, cells: a power of two, at most the root square's.
+    /// Side of a block, cells: a power of two, at most the root square's side.
     pub side: i32,
-    /// Blocks along the axes.
+    /// Number of blocks along (x, z).
     pub count: [i32; 2],
-    /// By block: its box in the world, if it has land.
+    /// World-space box of each block; `None` if it has no data.
     bounds: Vec<Option<Aabb>>,
-    /// By block: whether it may be in sight.
-    seen: Vec<bool>,
-    /// By block: the square that it is culled and drawn with.
+    /// True for each block that may be visible in the current view.
+    visible: Vec<bool>,
+    /// Square with which each block is culled and drawn.
     squares: Vec<Square>,
 }
 
 impl Blocks {
-    /// The blocks of a field.
+    /// Computes the blocks of a field. Procedural terrain has none.
     pub fn new(field: &Field, lattice: &Lattice) -> Self {
         if field.procedural().is_some() {
-            // Wedges tell themselves whether they are in sight.
+            // Procedural terrain culls wedges instead.
             return Self { side: lattice.side(), ..Self::default() };
         }
         let side = lattice.block_side();
@@ -48,63 +48,63 @@ impl Blocks {
         let of_block = |k: i32| bounds(field, last, side, [k % count[0], k / count[0]]);
         let bounds: Vec<_> = (0..count[0] * count[1]).into_par_iter().map(of_block).collect();
         let squares = squares(count, last, side, lattice.edge_side());
-        Self { side, count, seen: vec![false; bounds.len()], bounds, squares }
+        Self { side, count, visible: vec![false; bounds.len()], bounds, squares }
     }
 
-    /// Finds the blocks in sight.
-    pub fn look(&mut self, view: &View) {
+    /// Finds the blocks that may be visible in a view.
+    pub fn update_visibility(&mut self, view: &View) {
         let frustum = view.frustum();
-        self.seen.fill(false);
+        self.visible.fill(false);
         for (bounds, square) in self.bounds.iter().zip(&self.squares) {
-            self.seen[square.first] |=
+            self.visible[square.first] |=
                 bounds.as_ref().is_some_and(|bounds| frustum.contains(bounds) != Containment::Outside);
         }
     }
 
-    /// The block that a block is culled and drawn with.
+    /// Returns the block with which a block is culled and drawn.
     pub fn drawn_with(&self, block: usize) -> usize {
         self.squares[block].first
     }
 
-    /// Returns true if a wedge lies in one block or in a square that is drawn as one, also beyond the field.
-    pub fn hold(&self, corners: [Place; 3]) -> bool {
+    /// Returns true if a wedge lies in one block or in one square that is drawn as a block, also beyond the field.
+    pub fn contain(&self, corners: [Place; 3]) -> bool {
         let length = |k: usize| {
             let along = corners.map(|at| at[k]);
             along.into_iter().max().unwrap_or(0) - along.into_iter().min().unwrap_or(0)
         };
-        let side = self.around(corners).map_or(i32::MAX, |block| self.squares[block].side);
+        let side = self.block_at(corners).map_or(i32::MAX, |block| self.squares[block].side);
         length(0).max(length(1)) <= side
     }
 
-    /// The number of the block in sight with which a wedge within one is drawn.
-    pub fn seen(&self, corners: [Place; 3]) -> Option<usize> {
-        self.around(corners).map(|block| self.drawn_with(block)).filter(|&block| self.seen[block])
+    /// Returns the visible block with which a wedge within one block is drawn.
+    pub fn visible_block(&self, corners: [Place; 3]) -> Option<usize> {
+        self.block_at(corners).map(|block| self.drawn_with(block)).filter(|&block| self.visible[block])
     }
 
-    /// The block around the north-western corner of a wedge's box.
-    fn around(&self, corners: [Place; 3]) -> Option<usize> {
+    /// Returns the block at the north-western corner of a wedge's box.
+    fn block_at(&self, corners: [Place; 3]) -> Option<usize> {
         let [i, j] = [0, 1].map(|k| corners.iter().map(|at| at[k]).min().unwrap_or(0) / self.side);
         (i < self.count[0] && j < self.count[1]).then_some((j * self.count[0] + i) as usize)
     }
 
-    /// Whether a block may be in sight.
-    pub fn is_seen(&self, block: usize) -> bool {
-        self.seen[block]
+    /// Returns true if a block may be visible.
+    pub fn is_visible(&self, block: usize) -> bool {
+        self.visible[block]
     }
 
-    /// Sees these blocks only.
+    /// Makes exactly these blocks visible.
     #[cfg(test)]
-    pub fn see(&mut self, blocks: &[usize]) {
-        self.seen.iter_mut().enumerate().for_each(|(block, seen)| *seen = blocks.contains(&block));
+    pub fn set_visible(&mut self, blocks: &[usize]) {
+        self.visible.iter_mut().enumerate().for_each(|(block, visible)| *visible = blocks.contains(&block));
     }
 
-    /// The number of blocks.
+    /// Returns the number of blocks.
     pub fn number(&self) -> usize {
         self.bounds.len()
     }
 }
 
-/// By block: its square. Only squares that reach beyond the last sample are larger than a block.
+/// Returns the square of each block. Only squares that extend beyond the last sample are larger than a block.
 fn squares(count: [i32; 2], last: Place, side: i32, edge_side: i32) -> Vec<Square> {
     let of_block = |block: i32| {
         let at = [block % count[0], block / count[0]];

@@ -1,11 +1,11 @@
-//! Made-up spheres about places where the viewpoint was, each with the members of the front that lie beyond it.
+//! Bounding spheres about past viewpoints, which delay checks of wedges until the eye may have crossed their spheres.
 //!
-//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II: where there are many surfaces, made-up
-//! ones that belong to no wedge group them, and none of a group is looked at before the viewpoint crosses that. Here all
-//! members that were looked at in one frame lie around the place of the viewpoint in that frame, as shells one in the
-//! other: by how far the viewpoint may go from there before it can have crossed each. While it stays inside the
-//! innermost shell of a place, whichever way it goes there, none of them is looked at; and that shell itself is only
-//! when the way gone could have led out of it.
+//! Based on J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II. The lecture groups spheres by
+//! additional bounding spheres that belong to no wedge; no member of a group is checked before the eye crosses them.
+//! Here all wedges checked in one frame form a group around that frame's viewpoint. Each has a concentric sphere whose
+//! radius is the distance that the eye may move before it can cross the wedge's own sphere. No wedge is checked while
+//! the eye stays inside the innermost of these. That one is checked only when the distance travelled could have led out
+//! of it.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,58 +13,59 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::front::{CrossingTracker, Front, TrackingHandle};
-use super::measure::Known;
+use super::measure::DiamondInfo;
 use super::reach::Viewpoint;
 
-/// The shells about one place.
+/// Concentric spheres about one past viewpoint.
 #[derive(Default)]
-struct Nest {
+struct Group {
     centre: DVec3,
-    /// Radius, metres, as the bits of a positive float, and what it is for; the innermost last.
+    /// Radius, metres, as the bits of a positive float, and the tracked wedge; the innermost sphere last.
     bounding_spheres: Vec<(u64, TrackingHandle)>,
 }
 
-impl Nest {
-    /// How far the innermost shell is from a place inside it, metres.
+impl Group {
+    /// Returns the distance from a point inside to the innermost sphere, metres.
     fn slack(&self, eye: DVec3) -> Option<f64> {
         let &(radius, _) = self.bounding_spheres.last()?;
         Some(f64::from_bits(radius) - self.centre.distance(eye) * (1.0 + 1e-9))
     }
 }
 
-/// All places with their shells.
+/// All groups of spheres.
 #[derive(Default)]
 pub struct BoundingSpheres {
-    /// About the viewpoint, not sorted yet.
-    current: Nest,
-    nests: Vec<Nest>,
-    /// Numbers of nests without shells.
+    /// Group about the current viewpoint, not sorted yet.
+    current: Group,
+    groups: Vec<Group>,
+    /// Indices of groups without spheres.
     empty: Vec<u32>,
-    /// Way of the viewpoint, metres, upon which a nest's innermost shell may be crossed, as the bits of a float.
+    /// Travelled distance, metres, at which the innermost sphere of a group may be crossed, as the bits of a float; and
+    /// the group.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     eye: DVec3,
-    /// Way of the viewpoint so far, metres.
-    way: f64,
+    /// Distance that the eye has travelled so far, metres.
+    travelled: f64,
 }
 
 impl BoundingSpheres {
-    /// Sorts the shells about the last place of the viewpoint.
+    /// Sorts the spheres about the last viewpoint and starts tracking them.
     fn close_current(&mut self) {
         if self.current.bounding_spheres.is_empty() {
             return;
         }
-        self.current.bounding_spheres.sort_unstable_by_key(|&shell| Reverse(shell));
+        self.current.bounding_spheres.sort_unstable_by_key(|&sphere| Reverse(sphere));
         let number = self.empty.pop().unwrap_or_else(|| {
-            self.nests.push(Nest::default());
-            self.nests.len() as u32 - 1
+            self.groups.push(Group::default());
+            self.groups.len() as u32 - 1
         });
-        std::mem::swap(&mut self.nests[number as usize], &mut self.current);
-        self.await_innermost(number, self.eye);
+        std::mem::swap(&mut self.groups[number as usize], &mut self.current);
+        self.track_innermost(number, self.eye);
     }
 
-    fn await_innermost(&mut self, number: u32, eye: DVec3) {
-        match self.nests[number as usize].slack(eye) {
-            Some(slack) => self.queue.push(Reverse(((self.way + slack).max(0.0).to_bits(), number))),
+    fn track_innermost(&mut self, number: u32, eye: DVec3) {
+        match self.groups[number as usize].slack(eye) {
+            Some(slack) => self.queue.push(Reverse(((self.travelled + slack).max(0.0).to_bits(), number))),
             None => self.empty.push(number),
         }
     }
@@ -77,21 +78,21 @@ impl CrossingTracker for BoundingSpheres {
 
     fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, visited: &mut usize) {
         self.close_current();
-        self.way += self.eye.distance(from.eye) * (1.0 + 1e-9);
+        self.travelled += self.eye.distance(from.eye) * (1.0 + 1e-9);
         self.eye = from.eye;
-        while let Some(&Reverse((_, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.way) {
+        while let Some(&Reverse((_, number))) = self.queue.peek().filter(|q| f64::from_bits(q.0.0) <= self.travelled) {
             self.queue.pop();
             *visited += 1;
-            let (nest, way) = (&mut self.nests[number as usize], self.way);
-            // A slack that is nothing beside the way cannot be waited for.
-            while nest.slack(from.eye).is_some_and(|slack| way + slack <= way) {
-                handles.extend(nest.bounding_spheres.pop().map(|(_, handle)| handle));
+            let (group, travelled) = (&mut self.groups[number as usize], self.travelled);
+            // A slack below the distance's floating-point resolution would never become due, so it is due now.
+            while group.slack(from.eye).is_some_and(|slack| travelled + slack <= travelled) {
+                handles.extend(group.bounding_spheres.pop().map(|(_, handle)| handle));
             }
-            self.await_innermost(number, from.eye);
+            self.track_innermost(number, from.eye);
         }
     }
 
-    fn place(&mut self, front: &mut Front, handle: TrackingHandle, _known: &Known, _is_split: bool, slack: f64) {
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, _known: &DiamondInfo, _is_split: bool, slack: f64) {
         (self.eye, self.current.centre) = (front.from.eye, front.from.eye);
         self.current.bounding_spheres.push((slack.to_bits(), handle));
     }
@@ -103,9 +104,9 @@ mod tests {
     use crate::lod::sphere_tree::reach::Reach;
     use crate::view::{Lens, Metric, Tolerance, View};
 
-    /// After a long way, a shell is left that is nearer than the way's next number: it is not waited for for ever.
+    /// A sphere nearer than the floating-point resolution of a long travelled distance must still become due.
     #[test]
-    fn a_slack_that_is_nothing_beside_the_way_is_due() {
+    fn slack_below_float_resolution_is_due() {
         let view = View {
             eye: DVec3::ZERO,
             world_from_eye: View::turned(0.0, 0.0, 0.0),
@@ -116,7 +117,7 @@ mod tests {
             time_s: 0.0,
         };
         let from = |eye: DVec3| Viewpoint { eye, reach: Reach::new(&view), band: 1.0, hold: 1.0 };
-        let mut bounding_spheres = BoundingSpheres { way: 1e9, ..BoundingSpheres::default() };
+        let mut bounding_spheres = BoundingSpheres { travelled: 1e9, ..BoundingSpheres::default() };
         let handle = |index| TrackingHandle { index, number: index as u32 };
         bounding_spheres.current.bounding_spheres = vec![(5.0f64.to_bits(), handle(1)), (1e-9f64.to_bits(), handle(2))];
         let (mut handles, mut visited) = (Vec::new(), 0);

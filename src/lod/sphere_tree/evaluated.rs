@@ -1,11 +1,11 @@
-//! What is known of the diamonds of a land without samples: worked out when first asked for, from its bounds over all
-//! that hangs on a diamond, and kept for as long as there is room.
+//! Sizes of diamonds of a procedural terrain, computed from its analytic bounds on demand and cached.
 //!
-//! Nested as the measured ones are ([`measure`](super::measure)), and without a look at what lies below. All descendants
-//! of a diamond of half length h lie within 3 h of its middle along the axes if it is a cell's, 2 h if a side's. Bounds
-//! of a part are within those of the whole, so errors are nested. From parent to child middles are a step apart, h from
-//! a cell's and h/√2 from a side's, and steps shrink by √2: the length of all steps to come, and the most that heights
-//! change along them ([`Bounds::way_m`](crate::height::bezier::Bounds)), is a ball that holds the children's.
+//! Errors and balls are nested as the measured ones are ([`measure`](super::measure)), without visiting descendants.
+//! All descendants of a cell's diamond of half length h lie within 3 h of its middle along the axes; those of a side's
+//! within 2 h. Bounds of a part are within those of the whole, so errors are nested. The middles of parent and child
+//! are h apart from a cell's and h/√2 from a side's, and steps shrink by √2. A ball whose radius is the length of all
+//! following steps, plus the maximum change of height along them ([`Bounds::way_m`](crate::height::bezier::Bounds)),
+//! therefore contains the children's balls.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -17,33 +17,33 @@ use super::measure::SPARE;
 use crate::height::bezier::{Area, Bezier, SPACING_M};
 use crate::height::bounds::ROUNDING;
 
-/// What is kept is in so many parts, so that few wait for each other, each of at most so many diamonds.
+/// Number of cache shards, and the maximum number of diamonds in each. Shards reduce lock contention.
 const PARTS: usize = 64;
-const MAX_KEPT: usize = 1 << 15;
+const MAX_CACHED: usize = 1 << 15;
 
-/// A diamond's sizes, metres.
+/// Error and extent of a diamond, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// Height of its middle.
     pub height: f64,
-    /// The largest distance of its triangles, unsplit, and of all below, from the land.
+    /// Largest distance from the terrain of its unsplit triangles and of all its descendants.
     pub error: f32,
-    /// The ball about its middle that holds the land on which all below it lies, and the balls of all below.
+    /// Radius of the ball about its middle that contains its part of the terrain and its descendants' balls.
     pub ball: f32,
 }
 
-/// Sizes of diamonds of a land.
+/// Cache of the sizes of a terrain's diamonds.
 pub struct Evaluated {
     terrain: Arc<Bezier>,
-    /// The most that single precision adds to a vertex's height, relative to its distance from the eye.
+    /// Maximum rounding error of a vertex's height in single precision, relative to its distance from the eye.
     pub rounding: f64,
     parts: Vec<RwLock<ByIndex<Size>>>,
 }
 
 impl Evaluated {
-    /// Of a land whose vertices come at once, or fade in.
+    /// Creates an empty cache. `fades` adds the rounding error of vertices that fade in.
     pub fn new(terrain: Arc<Bezier>, fades: bool) -> Self {
-        // One rounding, or those of going from one height to another.
+        // Fading interpolates two heights, with more roundings than one conversion.
         let rounding = f64::from(if fades { ROUNDING } else { f32::EPSILON });
         Self { terrain, rounding, parts: (0..PARTS).map(|_| RwLock::default()).collect() }
     }
@@ -52,34 +52,34 @@ impl Evaluated {
         &self.parts[(index ^ index >> 20) % PARTS]
     }
 
-    /// The sizes of a diamond.
+    /// Returns the sizes of a diamond, computing them if they are not cached.
     pub fn size(&self, at: Place, index: usize) -> Size {
         let part = self.part(index);
         if let Some(size) = part.read().unwrap_or_else(PoisonError::into_inner).get(&(index as u64)) {
             return *size;
         }
-        let size = self.work_out(at);
+        let size = self.compute(at);
         let mut part = part.write().unwrap_or_else(PoisonError::into_inner);
-        if part.len() == MAX_KEPT {
+        if part.len() == MAX_CACHED {
             part.clear();
         }
         part.insert(index as u64, size);
         size
     }
 
-    /// Works out side by side what is not known yet.
-    pub fn look_ahead(&self, diamonds: &[(Place, usize)]) {
+    /// Computes in parallel the sizes of diamonds that are not cached.
+    pub fn precompute(&self, diamonds: &[(Place, usize)]) {
         diamonds.par_iter().with_min_len(16).for_each(|&(at, index)| {
             self.size(at, index);
         });
     }
 
-    /// How many are kept.
-    pub fn kept(&self) -> usize {
+    /// Returns the number of cached diamonds.
+    pub fn cached(&self) -> usize {
         self.parts.iter().map(|part| part.read().unwrap_or_else(PoisonError::into_inner).len()).sum()
     }
 
-    fn work_out(&self, at: Place) -> Size {
+    fn compute(&self, at: Place) -> Size {
         let half = half_length(at);
         let is_cell = at.iter().all(|n| n & half != 0);
         let half_m = f64::from(half) * SPACING_M;
@@ -88,7 +88,7 @@ impl Evaluated {
         let bounds = self.terrain.bounds(&Area::about(place, reach * half_m), longest_m);
         let steps_m = longest_m / 8f64.sqrt() / (1.0 - 0.5f64.sqrt());
         let ball = (steps_m + bounds.way_m) * (1.0 + SPARE);
-        // Corners are up to two balls further from the eye than what lies between them.
+        // Corners are up to two balls further from the eye than the points between them.
         let rounding_m = 2.0 * ball * self.rounding;
         Size {
             height: self.terrain.height(place),
@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// From the root to the last places, down random ways.
+    /// Checks random diamonds from the root to the finest level.
     #[test]
     fn errors_and_balls_are_nested_at_every_depth() {
         let evaluated = Evaluated::new(Arc::new(Bezier::new(7, 24)), true);
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// Points sown densely over a diamond's wedges: within the error of its triangles as they are drawn, and in its ball.
+    /// Checks random points of random diamonds against the error of the drawn triangle and the ball.
     #[test]
     fn the_terrain_is_within_a_diamond_s_error_at_every_depth() {
         let terrain = Arc::new(Bezier::new(7, 24));
@@ -145,7 +145,7 @@ mod tests {
                 let at = random_place(&mut dice, level);
                 let size = evaluated.size(at, lattice.index(at).expect("a diamond"));
                 let Diamond { ends, apexes } = Diamond::around(at);
-                // Heights are relative to an eye beside the diamond.
+                // Heights are rounded relative to an eye beside the diamond.
                 let drawn = [apexes[0], ends[0], ends[1]].map(|p| {
                     let plan = p.map(|n| f64::from(n) * SPACING_M);
                     [plan[0], plan[1], size.height + f64::from((terrain.height(plan) - size.height) as f32)]

@@ -1,40 +1,40 @@
-//! The set of split diamonds kept from view to view: only what may have changed is looked at.
+//! Updates the set of split diamonds from view to view, checking only those that may have changed.
 //!
-//! What may change is the *front*: split diamonds of which no child has split, which may merge, and diamonds whose
-//! parents all have, which may split. All others wait behind them, since spheres are nested. Who looks after the front
-//! ([`CrossingTracker`]) says which of it the viewpoint may have crossed.
+//! These are the *front*: split diamonds without split children, which may merge, and diamonds whose parents have all
+//! split, which may split. All others are behind them, because spheres are nested. A [`CrossingTracker`] reports the
+//! diamonds of the front whose sphere the eye may have crossed.
 //!
-//! Diamonds looked at and time for a frame's changes, medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m above
-//! ground, one core. ROAM's priorities wait for the viewpoint's largest speed, as published: 5 m a frame.
+//! Diamonds checked and time for a frame's changes: medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m
+//! above ground, on one core. ROAM's priorities use the published rule with a maximum speed of 5 m a frame.
 //!
-//! | wedges | eye | spheres | ROAM | every one anew |
+//! | wedges | eye | spheres | ROAM | all checked |
 //! |---|---|---|---|---|
 //! | 10⁴ | 0.05 m a frame | 44, 2.6 µs | 462, 33 µs | 15 k, 1.2 ms |
 //! | | 5 m a frame | 618, 37 µs | 514, 46 µs | 15 k, 1.2 ms |
-//! | | leaps | 3.1 ms | 2.4 ms | 1.4 ms |
+//! | | teleports | 3.1 ms | 2.4 ms | 1.4 ms |
 //! | 10⁵ | 0.05 m a frame | 142, 9.5 µs | 2000, 264 µs | 139 k, 12 ms |
 //! | | 5 m a frame | 2690, 0.22 ms | 2460, 0.39 ms | 139 k, 12 ms |
-//! | | leaps | 23 ms | 29 ms | 12 ms |
+//! | | teleports | 23 ms | 29 ms | 12 ms |
 //! | 10⁶ | 0.05 m a frame | 522, 80 µs | 9268, 4.4 ms | 1.35 M, 121 ms |
 //! | | 5 m a frame | 11.7 k, 3.2 ms | 11.7 k, 5.0 ms | 1.35 M, 121 ms |
-//! | | leaps | 1.67 M, 319 ms | 1.67 M, 351 ms | 1.17 M, 91 ms |
+//! | | teleports | 1.67 M, 319 ms | 1.67 M, 351 ms | 1.17 M, 91 ms |
 //!
-//! So a front pays as long as the eye moves: one that leaps had better find everything anew.
+//! A front is faster while the eye moves continuously; after a teleport, checking all diamonds is faster.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::lattice::Place;
-use super::measure::{Known, Measured};
+use super::measure::{DiamondInfo, Measured};
 use super::reach::Viewpoint;
 use super::splits::{Changes, Found, Splits};
 
-/// A place in the front at one time: index of the diamond and when it got its watch.
+/// Identifies one tracking of a diamond of the front. A diamond gets a new handle each time it is tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TrackingHandle {
     /// Index of the diamond.
     pub index: u64,
-    /// No two tickets have the same.
+    /// Unique number.
     pub number: u32,
 }
 
@@ -43,13 +43,13 @@ pub struct TrackingHandle {
 pub struct Member {
     /// Its middle.
     pub at: Place,
-    /// Whether it has split.
+    /// True if it has split.
     pub is_split: bool,
-    /// Its ticket's number.
+    /// Number of its current handle; `u32::MAX` while it has none.
     number: u32,
 }
 
-/// Multiplies: indices are spread well enough by that.
+/// Multiplicative hash of diamond indices.
 #[derive(Default)]
 pub struct IndexHasher(u64);
 
@@ -67,36 +67,37 @@ impl Hasher for IndexHasher {
     }
 }
 
-/// A map by index.
+/// A map from diamond index.
 pub type ByIndex<T> = HashMap<u64, T, BuildHasherDefault<IndexHasher>>;
 
-/// The front's members by index, with the surroundings that a watch may look at.
+/// State of the front that a [`CrossingTracker`] may read.
 pub struct Front<'a> {
-    /// Diamonds.
+    /// Errors and balls of all diamonds.
     pub measured: &'a Measured,
-    /// The viewpoint.
+    /// Current viewpoint.
     pub from: &'a Viewpoint,
-    /// What has split.
+    /// Split diamonds.
     pub splits: &'a Splits,
-    /// Members.
+    /// Diamonds of the front by index.
     pub members: &'a ByIndex<Member>,
-    /// Diamonds looked at.
+    /// Counter of diamonds checked.
     pub visited: &'a mut usize,
 }
 
-/// Who looks after the front.
+/// Schedules the checks of the front's diamonds.
 pub trait CrossingTracker: Default + Send {
-    /// Forgets all tickets.
+    /// Discards all handles.
     fn clear(&mut self);
 
-    /// The viewpoint is now here: gives back the tickets of all that it may have crossed, maybe with stale ones.
+    /// Moves to a viewpoint. Appends the handles of all diamonds whose sphere the eye may have crossed; some may be
+    /// stale.
     fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, visited: &mut usize);
 
-    /// Looks after a member that the eye may move `slack` metres (above 0, finite) without crossing.
-    fn place(&mut self, front: &mut Front, handle: TrackingHandle, known: &Known, is_split: bool, slack: f64);
+    /// Tracks a diamond whose sphere the eye cannot cross within `slack` metres (finite, above 0).
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, diamond: &DiamondInfo, is_split: bool, slack: f64);
 
-    /// A member has left: gives back the tickets of those that relied on it.
-    fn left(&mut self, _index: u64, _handles: &mut Vec<TrackingHandle>) {}
+    /// Handles a diamond's removal from the front. Appends the handles whose tracking depended on it.
+    fn removed(&mut self, _index: u64, _handles: &mut Vec<TrackingHandle>) {}
 }
 
 /// A set of split diamonds that follows a viewpoint.
@@ -105,8 +106,8 @@ pub struct Follower<W> {
     members: ByIndex<Member>,
     tracker: W,
     next_number: u32,
-    /// To look at: what may split, and what may merge.
-    fresh: [Vec<u64>; 2],
+    /// Indices of diamonds to check: those that may split, and those that may merge.
+    unchecked: [Vec<u64>; 2],
     handles: Vec<TrackingHandle>,
     last: Option<Viewpoint>,
     visited: usize,
@@ -114,14 +115,14 @@ pub struct Follower<W> {
 }
 
 impl<W: CrossingTracker> Follower<W> {
-    /// Follows nothing yet.
+    /// Creates an empty set that follows no viewpoint yet.
     pub fn new(measured: &Measured) -> Self {
         Self {
             splits: Splits::none(measured),
             members: ByIndex::default(),
             tracker: W::default(),
             next_number: 0,
-            fresh: [Vec::new(), Vec::new()],
+            unchecked: [Vec::new(), Vec::new()],
             handles: Vec::new(),
             last: None,
             visited: 0,
@@ -129,30 +130,30 @@ impl<W: CrossingTracker> Follower<W> {
         }
     }
 
-    /// What has split.
+    /// Returns the set of split diamonds.
     pub fn splits(&self) -> &Splits {
         &self.splits
     }
 
-    /// What has split or merged since the last call.
+    /// Returns the diamonds that split or merged since the last call.
     pub fn changes(&mut self) -> Changes {
         self.splits.changes()
     }
 
-    /// Who looks after the front.
+    /// Returns the tracker.
     pub fn tracker(&mut self) -> &mut W {
         &mut self.tracker
     }
 
-    /// Diamonds looked at for the last viewpoint.
+    /// Returns the number of diamonds checked for the last viewpoint.
     pub fn visited(&self) -> usize {
         self.visited
     }
 
-    /// Moves on to a viewpoint; `false` if more than `max` diamonds would have split: then nothing is followed.
+    /// Updates the set for a viewpoint. Returns false, and resets, if more than `max` diamonds would split.
     pub fn follow(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
         self.visited = 0;
-        // Other spheres: all is to be looked at.
+        // Other radii invalidate all tracked spheres.
         let is_same = |last: &Viewpoint| Viewpoint { eye: from.eye, ..*last } == *from;
         if !self.last.as_ref().is_some_and(is_same) {
             return self.start(measured, from, max);
@@ -162,12 +163,12 @@ impl<W: CrossingTracker> Follower<W> {
         }
         self.last = Some(*from);
         self.tracker.due(from, &mut self.handles, &mut self.visited);
-        // Where nearly all is to be looked at, the plain way is shorter.
+        // If most diamonds are due, starting again is faster.
         if self.handles.len() > 64 && self.handles.len() > self.members.len() / 2 {
             return self.start(measured, from, max);
         }
-        self.redeem();
-        // On the way there may be more than at the end, since what merges comes last.
+        self.queue_due();
+        // The set may exceed `max` during the update only, because merges come last.
         self.settle(measured, from, max) || self.start(measured, from, max)
     }
 
@@ -176,7 +177,7 @@ impl<W: CrossingTracker> Follower<W> {
         self.handles.clear();
         self.members.clear();
         self.tracker.clear();
-        self.fresh.iter_mut().for_each(Vec::clear);
+        self.unchecked.iter_mut().for_each(Vec::clear);
         let mut found = std::mem::take(&mut self.found);
         let fits = self.splits.refill(measured, from, &mut found, max);
         self.visited += found.visited;
@@ -196,51 +197,52 @@ impl<W: CrossingTracker> Follower<W> {
 
     fn add(&mut self, at: Place, index: usize, is_split: bool) {
         self.members.insert(index as u64, Member { at, is_split, number: u32::MAX });
-        self.fresh[usize::from(is_split)].push(index as u64);
+        self.unchecked[usize::from(is_split)].push(index as u64);
     }
 
-    /// Adds a diamond that may split and is not there yet.
+    /// Adds a diamond to the front if it may split and is not in it yet.
     fn add_if_ready(&mut self, measured: &Measured, from: &Viewpoint, at: Option<Place>) {
         let Some((at, index)) = at.and_then(|at| Some((at, measured.lattice.index(at)?))) else { return };
         let is_new = !self.splits.contains(index) && !self.members.contains_key(&(index as u64));
-        if is_new && measured.matters(&from.reach, index) && self.splits.is_ready(measured, at) {
+        if is_new && measured.has_sphere(&from.reach, index) && self.splits.is_ready(measured, at) {
             self.add(at, index, false);
         }
     }
 
     fn remove(&mut self, index: usize) {
         if self.members.remove(&(index as u64)).is_some() {
-            self.tracker.left(index as u64, &mut self.handles);
+            self.tracker.removed(index as u64, &mut self.handles);
         }
     }
 
-    /// Looks again at those whose tickets are still good.
-    fn redeem(&mut self) {
+    /// Queues the diamonds whose handles are still valid.
+    fn queue_due(&mut self) {
         for handle in self.handles.drain(..) {
             if let Some(member) = self.members.get_mut(&handle.index).filter(|m| m.number == handle.number) {
                 member.number = u32::MAX;
-                self.fresh[usize::from(member.is_split)].push(handle.index);
+                self.unchecked[usize::from(member.is_split)].push(handle.index);
             }
         }
     }
 
-    /// Looks at members until none is on the wrong side of its sphere.
+    /// Checks queued diamonds until all are on the right side of their spheres. Returns false if more than `max` have
+    /// split.
     fn settle(&mut self, measured: &Measured, from: &Viewpoint, max: usize) -> bool {
-        // What may merge comes last: it may be needed by then.
-        while let Some(index) = self.fresh[0].pop().or_else(|| self.fresh[1].pop()) {
+        // Merges come last, because later splits may need the diamond.
+        while let Some(index) = self.unchecked[0].pop().or_else(|| self.unchecked[1].pop()) {
             let Some(&Member { at, is_split, number }) = self.members.get(&index) else { continue };
             if number != u32::MAX {
                 continue;
             }
             self.visited += 1;
-            let known = measured.known(at, index as usize);
-            let slack = from.slack(&known, is_split);
+            let diamond = measured.diamond(at, index as usize);
+            let slack = from.slack(&diamond, is_split);
             match (slack > 0.0, is_split) {
-                (true, _) => self.look_after(measured, from, &known, is_split, slack),
+                (true, _) => self.track(measured, from, &diamond, is_split, slack),
                 (false, false) => self.split(measured, from, at, index as usize),
                 (false, true) => self.merge(measured, from, at, index as usize),
             }
-            self.redeem();
+            self.queue_due();
             if self.splits.count() > max {
                 self.last = None;
                 return false;
@@ -249,14 +251,14 @@ impl<W: CrossingTracker> Follower<W> {
         true
     }
 
-    fn look_after(&mut self, measured: &Measured, from: &Viewpoint, known: &Known, is_split: bool, slack: f64) {
-        let handle = TrackingHandle { index: known.index as u64, number: self.next_number };
+    fn track(&mut self, measured: &Measured, from: &Viewpoint, diamond: &DiamondInfo, is_split: bool, slack: f64) {
+        let handle = TrackingHandle { index: diamond.index as u64, number: self.next_number };
         self.next_number = (self.next_number + 1) % u32::MAX;
         self.members.get_mut(&handle.index).expect("a member").number = handle.number;
         if slack.is_finite() {
             let Self { splits, members, visited, .. } = self;
             let mut front = Front { measured, from, splits, members, visited };
-            self.tracker.place(&mut front, handle, known, is_split, slack);
+            self.tracker.place(&mut front, handle, diamond, is_split, slack);
         }
     }
 

@@ -1,17 +1,19 @@
-//! The binary triangle tree over a field, as its diamonds: where they are, and which ones split first.
+//! Geometry of a binary triangle tree over a field, organised by diamonds.
 //!
-//! Two wedges that share a hypotenuse split together, so that the mesh conforms: they make a *diamond*, known by the
-//! middle of that hypotenuse, a vertex of the lattice. Each vertex but the root square's corners is the middle of one
-//! diamond. Where the lowest set bit of both coordinates is the same it is the middle of a cell, whose diagonal turns
-//! with the cell's parity as everywhere in this crate; otherwise the middle of a cell's side. A diamond can split when
-//! its *parents* have, those whose middles are its wedges' apexes; its *children* are in the middles of its four sides.
+//! A *wedge* is a right isosceles triangle of the tree. Two wedges that share a hypotenuse split together, so that the
+//! mesh is conforming. They form a *diamond*, identified by the middle of that hypotenuse, a vertex of the lattice.
+//! Each vertex except the root square's corners is the middle of one diamond. If the lowest set bits of both
+//! coordinates are equal, it is the middle of a cell; the diagonal alternates with the cell's parity, as everywhere in
+//! this crate. Otherwise it is the middle of a cell's side. A diamond can split once its *parents* have: the diamonds
+//! whose middles are its wedges' apexes. Its *children* are in the middles of its four sides.
 //!
-//! The root square is as large as the field's longer side or larger. Vertices beyond the field collapse onto its edge:
-//! hypotenuses are lines of the lattice or diagonals, and so no triangle turns over by that. Diagonals that cross the
-//! edge bend, so that a collapsed wedge covers other land than the two halves it splits into do. Hence coarse diamonds
-//! that stick out always split ([`Lattice::always_splits`]). Diamonds that do not reach into the field are left out.
+//! The root square is at least as large as the field's longer side. Vertices beyond the field collapse onto its edge.
+//! Hypotenuses are axis-parallel or diagonal, so no triangle flips by that. A diagonal that crosses the edge bends, so
+//! a collapsed wedge covers another area than its two halves. Coarse diamonds that extend beyond the field therefore
+//! always split ([`Lattice::always_splits`]). Diamonds entirely outside the field are omitted.
 
-/// A vertex of the lattice, finest samples from the field's first one on; in the root square, maybe beyond the field.
+/// A vertex of the lattice, (x, z) in samples from the field's first one. It lies in the root square and may lie beyond
+/// the field.
 pub type Place = [i32; 2];
 
 /// Two wedges that share a hypotenuse.
@@ -19,12 +21,12 @@ pub type Place = [i32; 2];
 pub struct Diamond {
     /// Ends of the hypotenuse.
     pub ends: [Place; 2],
-    /// Where the wedges have their right angles; one may lie outside the root square.
+    /// Apexes of the wedges, at their right angles. One may lie outside the root square.
     pub apexes: [Place; 2],
 }
 
 impl Diamond {
-    /// The one with this middle, which must not be the origin.
+    /// Returns the diamond with this middle, which must not be the origin.
     pub fn around([x, z]: Place) -> Self {
         let half = half_length([x, z]);
         let to = |dx: i32, dz: i32| [x + dx * half, z + dz * half];
@@ -40,45 +42,46 @@ impl Diamond {
     }
 }
 
-/// Half the length of a diamond along the axes, samples: the lowest set bit of its middle's coordinates.
+/// Returns half the extent of a diamond along the axes, samples: the lowest set bit of its middle's coordinates.
 pub fn half_length([x, z]: Place) -> i32 {
     let both = x | z;
     both & both.wrapping_neg()
 }
 
-/// Blocks along the root square's side, at most.
+/// Maximum number of blocks along the root square's side.
 const MAX_BLOCKS_ALONG: i32 = 32;
-/// The smallest side of a block, cells.
+/// Minimum side of a block, cells.
 const MIN_BLOCK_SIDE: i32 = 32;
-/// Blocks along a square that is culled as one at the field's edge: a power of two. More take fewer triangles at wide
-/// tolerances, and cull less at narrow ones. Triangles over 921 × 859 samples of mountains, in eleven views together:
+/// Blocks along the side of a square that is culled as one at the field's edge: a power of two. Larger squares draw
+/// fewer triangles at great tolerances and cull less at small ones. Triangles over 921 × 859 samples of mountains, sum
+/// of eleven views:
 ///
-/// | tolerance | 1 | 2 | 4 | 8 blocks |
+/// | tolerance | 1 block | 2 | 4 | 8 |
 /// |---|---|---|---|---|
 /// | 1 px | 411 905 | 412 212 | 415 521 | 425 636 |
 /// | 16 px | 11 741 | 10 928 | 10 677 | 10 656 |
 /// | 64 px | 3812 | 2767 | 2316 | 2161 |
-/// | all land is flat, one view | 314 | 139 | 60 | 24 |
+/// | flat terrain, one view | 314 | 139 | 60 | 24 |
 const EDGE_BLOCKS: i32 = 2;
 
-/// The diamonds over a field.
+/// Diamonds over a field.
 #[derive(Clone, Debug)]
 pub struct Lattice {
     last: Place,
-    /// log2 of the root square's side.
+    /// Base-2 logarithm of the root square's side.
     depth: u32,
-    /// By the exponent of the half length: places along the axes, and the index of the first.
+    /// Number of places along (x, z) and first index of each level. The level is the exponent of the half length.
     levels: Vec<([i32; 2], usize)>,
     len: usize,
 }
 
 impl Lattice {
-    /// Over a field whose last sample is this one.
+    /// Creates the lattice of a field with this last sample.
     pub fn new(last: Place) -> Self {
         let depth = (last[0].max(last[1]) as u32).next_power_of_two().ilog2();
         let (mut levels, mut len) = (Vec::new(), 0);
         for level in 0..depth {
-            // What begins beyond the field does not reach into it.
+            // Diamonds that begin beyond the field do not overlap it.
             let count = last.map(|n| ((n - 1) >> level) + 2);
             levels.push((count, len));
             len += count[0] as usize * count[1] as usize;
@@ -86,42 +89,43 @@ impl Lattice {
         Self { last, depth, levels, len }
     }
 
-    /// Side of the root square, samples.
+    /// Returns the side of the root square, samples.
     pub fn side(&self) -> i32 {
         1 << self.depth
     }
 
-    /// Side of the aligned squares by which triangles are culled, cells: a power of two, at most the root square's.
+    /// Returns the side of the aligned squares by which triangles are culled, cells: a power of two, at most the root
+    /// square's.
     pub fn block_side(&self) -> i32 {
         (self.side() / MAX_BLOCKS_ALONG).max(MIN_BLOCK_SIDE).min(self.side())
     }
 
-    /// Side of the aligned squares whose blocks are culled together where the field's edge crosses them, cells.
+    /// Returns the side of the aligned squares whose blocks are culled together at the field's edge, cells.
     pub fn edge_side(&self) -> i32 {
         (EDGE_BLOCKS * self.block_side()).min(self.side())
     }
 
-    /// The number of levels of cells' middles.
+    /// Returns the number of levels of cells' middles.
     pub fn levels(&self) -> u32 {
         self.depth
     }
 
-    /// Indices are below this.
+    /// Returns the number of indices; all are below it.
     pub fn size(&self) -> usize {
         self.len
     }
 
-    /// The middle of the root square, where it has one.
+    /// Returns the middle of the root square; `None` if its side is one cell.
     pub fn root(&self) -> Option<Place> {
         (self.depth > 0).then(|| [self.side() / 2; 2])
     }
 
-    /// Places along the axes of the level with this exponent of half a diamond's length.
+    /// Returns the number of places along (x, z) of a level, the exponent of a diamond's half length.
     pub fn count(&self, level: u32) -> [i32; 2] {
         self.levels[level as usize].0
     }
 
-    /// The index of the diamond with this middle; `None` if there is none.
+    /// Returns the index of the diamond with this middle; `None` if none exists.
     #[inline]
     pub fn index(&self, [x, z]: Place) -> Option<usize> {
         let level = (x | z).trailing_zeros();
@@ -131,20 +135,21 @@ impl Lattice {
             .then(|| first + j as usize * x_count as usize + i as usize)
     }
 
-    /// The diamonds that must have split before this one can.
+    /// Returns the diamonds that must have split before this one can.
     #[inline]
     pub fn parents(&self, middle: Place) -> impl Iterator<Item = (Place, usize)> {
         Diamond::around(middle).apexes.into_iter().filter_map(|at| Some((at, self.index(at)?)))
     }
 
-    /// The diamonds that need this one to have split.
+    /// Returns the diamonds that can only split after this one.
     #[inline]
     pub fn children(&self, middle: Place) -> impl Iterator<Item = (Place, usize)> {
         let [x, z] = middle;
         let half = half_length(middle);
         let is_cell = x & half != 0 && z & half != 0;
         let quarter = half >> 1;
-        // A cell's children are in the middles of its sides, a side's in the middles of the cells around its ends.
+        // Children of a cell's diamond are in the middles of its sides; of a side's, in the middles of the cells around
+        // its ends.
         let at = if is_cell {
             [[x - half, z], [x + half, z], [x, z - half], [x, z + half]]
         } else {
@@ -154,13 +159,13 @@ impl Lattice {
         at.into_iter().filter(move |_| has_children).filter_map(|at| Some((at, self.index(at)?)))
     }
 
-    /// Where a vertex is drawn: on the field.
+    /// Returns a vertex clamped to the field, where it is drawn.
     #[inline]
     pub fn on_field(&self, [x, z]: Place) -> Place {
         [x.min(self.last[0]), z.min(self.last[1])]
     }
 
-    /// Whether a vertex lies in the root square.
+    /// Returns true if a vertex lies in the root square.
     pub fn contains(&self, [x, z]: Place) -> bool {
         (0..=self.side()).contains(&x) && (0..=self.side()).contains(&z)
     }
@@ -172,15 +177,16 @@ impl Lattice {
         i64::from(bz - az) * i64::from(cx - ax) == i64::from(bx - ax) * i64::from(cz - az)
     }
 
-    /// Returns true if a diamond splits in every view: it sticks out of the field and is larger than a square of blocks that are
-    /// culled together. So no drawn wedge sticks out of the square that it is culled with.
+    /// Returns true if a diamond splits in every view. It does if it extends beyond the field and is larger than a
+    /// square of blocks that are culled together. No drawn wedge therefore extends beyond the square that it is culled
+    /// with.
     pub fn always_splits(&self, middle: Place) -> bool {
         let Diamond { ends, apexes } = Diamond::around(middle);
         let has_area = |&apex: &Place| self.contains(apex) && !self.collapses([apex, ends[0], ends[1]]);
         2 * half_length(middle) > self.edge_side() && self.sticks_out(middle) && apexes.iter().any(has_area)
     }
 
-    /// Whether a diamond has a corner beyond the field.
+    /// Returns true if a diamond has a corner beyond the field.
     pub fn sticks_out(&self, middle: Place) -> bool {
         let Diamond { ends, apexes } = Diamond::around(middle);
         let mut corners = ends.into_iter().chain(apexes).filter(|&at| self.contains(at));

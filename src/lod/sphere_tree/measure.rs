@@ -1,10 +1,9 @@
-//! What is known of the diamonds before any view: how far unsplit ones are from the samples, and how large the ball is
-//! that holds all that they cover.
+//! Measures all diamonds in advance: their error against the samples, and the ball that contains all they cover.
 //!
-//! Both are nested: a diamond's error is at least its children's, and its ball holds theirs. So a sphere about the same
-//! middle with a radius that grows with the error and is the ball's plus that holds the children's spheres, for every
-//! view: no diamond splits before its parents. (P. Lindstrom and V. Pascucci, "Visualization of Large Terrains Made
-//! Easy", 2001, §4, nest the spheres of vertices in the same way.)
+//! Both are nested: a diamond's error is at least its children's, and its ball contains theirs. A sphere's radius is
+//! the ball's plus a term that grows with the error, so a diamond's sphere contains its children's in every view. No
+//! diamond splits before its parents. P. Lindstrom and V. Pascucci, "Visualization of Large Terrains Made Easy" (2001),
+//! §4, nest the spheres of vertices in the same way.
 
 use std::sync::Arc;
 
@@ -20,47 +19,47 @@ use crate::height::progress::Progress;
 use crate::height::surface::{self, Corner};
 use crate::view::{Tolerance, View};
 
-/// What rounding may take from a ball, relative: far more than that of a distance in f64.
+/// Relative margin of a ball's radius for rounding, far above that of a distance in f64.
 pub const SPARE: f64 = 1e-6;
 
-/// A field with its diamonds measured.
+/// A field with its measured diamonds.
 pub struct Measured {
     /// Heights.
     pub field: Arc<Field>,
     /// Diamonds.
     pub lattice: Lattice,
-    /// By index, metres: the largest distance of an unsplit diamond's triangles from the samples; infinite where it
-    /// always splits.
+    /// Largest distance of an unsplit diamond's triangles from the samples, metres, by index; infinite if it always
+    /// splits.
     errors: Vec<f32>,
-    /// By index, metres: the ball about the middle.
+    /// Radius of the ball about the middle, metres, by index.
     balls: Vec<f32>,
-    /// By how much a sphere is larger for vertices to fade in.
+    /// Multiple of the radius from which vertices fade in; 1 if they do not.
     band: f32,
-    /// What rounding may add to the error of vertices on their way, metres.
+    /// Maximum rounding error of vertices that fade in, metres.
     rounding: f32,
-    /// In place of errors and balls where there are no samples to measure.
+    /// Replaces errors and balls for procedural terrain, which has no samples.
     evaluated: Option<Evaluated>,
 }
 
-/// A diamond with what is known of it.
+/// A diamond with its error and ball.
 #[derive(Clone, Copy, Debug)]
-pub struct Known {
-    /// Its middle on the lattice.
+pub struct DiamondInfo {
+    /// Middle on the lattice.
     pub at: Place,
-    /// Its index.
+    /// Index.
     pub index: usize,
-    /// Its middle from the field's first sample on, at its height, metres.
+    /// Middle relative to the field's first sample, at its height, metres.
     pub centre: DVec3,
-    /// Metres.
+    /// Largest distance from the terrain, metres.
     pub error: f32,
-    /// Metres.
+    /// Radius of the ball about the middle, metres.
     pub ball: f32,
 }
 
 impl Measured {
-    /// Measures all diamonds, level by level in parallel. Where vertices fade in over a `band` above 1 times a sphere's
-    /// radius and one does not, because its diamond sticks out of the field, its parents' spheres are larger by that:
-    /// what they hang on is there in full.
+    /// Measures all diamonds, level by level in parallel. `band` is the multiple of a sphere's radius from which
+    /// vertices fade in. The vertex of a diamond that extends beyond the field does not fade; its parents' spheres are
+    /// larger by `band`, so that the vertices it depends on have fully faded in.
     pub fn new(field: Arc<Field>, band: f32, progress: &Progress) -> Self {
         let lattice = Lattice::new(field.size().map(|n| n as i32 - 1));
         if let Some(terrain) = field.procedural() {
@@ -73,21 +72,21 @@ impl Measured {
         let nothing = || vec![0.0; lattice.size()];
         let mut measured =
             Self { errors: nothing(), balls: nothing(), field, lattice, band, rounding, evaluated: None };
-        // Every level goes through all samples.
+        // Each level reads all samples.
         let rows = |level: u32| (measured.lattice.count(level)[1] as u64) << level;
         progress.expect((0..measured.lattice.levels()).map(|level| 2 * rows(level)).sum());
         for level in 0..measured.lattice.levels() {
-            // Sides before cells: a cell's children are in its sides.
+            // Sides before cells, because a cell's children are its sides.
             measured.measure_level(level, progress, |i, j| (i ^ j) & 1 == 1);
             measured.measure_level(level, progress, |i, j| i & j & 1 == 1);
         }
         measured
     }
 
-    fn measure_level(&mut self, level: u32, progress: &Progress, is_meant: impl Fn(i32, i32) -> bool + Sync) {
+    fn measure_level(&mut self, level: u32, progress: &Progress, is_selected: impl Fn(i32, i32) -> bool + Sync) {
         let [x_count, z_count] = self.lattice.count(level);
         let of_row = |j: i32| {
-            let row = (0..x_count).filter(|&i| is_meant(i, j));
+            let row = (0..x_count).filter(|&i| is_selected(i, j));
             let row = row.map(|i| self.measure([i << level, j << level])).collect::<Vec<_>>();
             progress.advance(1 << level);
             row
@@ -99,8 +98,8 @@ impl Measured {
         }
     }
 
-    /// Index, error and ball of a diamond whose children are measured. The ball holds all samples under its wedges, where
-    /// these collapse too: a side's diamond has the balls of the cells that it reaches into.
+    /// Returns the index, error and ball of a diamond whose children are measured. The ball contains all samples under
+    /// its wedges, also where these collapse: a side's diamond includes the balls of the cells it overlaps.
     fn measure(&self, middle: Place) -> (usize, f32, f32) {
         let index = self.lattice.index(middle).expect("a place of the level");
         let Diamond { ends, apexes } = Diamond::around(middle);
@@ -119,14 +118,14 @@ impl Measured {
             error += self.rounding;
         }
         for (at, child) in self.lattice.children(middle) {
-            let second_target = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
-            error = error.max(self.errors[child] * second_target);
-            ball = ball.max(self.centre(at).distance(centre) + f64::from(self.balls[child] * second_target));
+            let growth = if !sticks_out && self.lattice.sticks_out(at) { self.band } else { 1.0 };
+            error = error.max(self.errors[child] * growth);
+            ball = ball.max(self.centre(at).distance(centre) + f64::from(self.balls[child] * growth));
         }
         (index, error, ((ball * (1.0 + SPARE)) as f32).next_up())
     }
 
-    /// How far a triangle is from the samples in it, metres; 0 if it collapses.
+    /// Returns the largest distance of a triangle from its samples, metres; 0 if it collapses.
     fn deviation(&self, corners: [Place; 3]) -> f32 {
         let [a, b, c] = corners.map(|at| {
             let [x, z] = self.lattice.on_field(at);
@@ -139,7 +138,7 @@ impl Measured {
         }
     }
 
-    /// Height of a vertex, metres.
+    /// Returns the height of a vertex, metres.
     #[inline]
     pub fn height(&self, at: Place) -> f64 {
         if let (Some(evaluated), Some(index)) = (&self.evaluated, self.lattice.index(at)) {
@@ -149,7 +148,7 @@ impl Measured {
         f64::from(self.field.height(x as u32, z as u32))
     }
 
-    /// A vertex from the field's first sample on, metres.
+    /// Returns a vertex relative to the field's first sample, metres.
     #[inline]
     fn centre(&self, at: Place) -> DVec3 {
         let [x, z] = self.lattice.on_field(at);
@@ -157,35 +156,35 @@ impl Measured {
         DVec3::new(f64::from(x) * dx, f64::from(self.field.height(x as u32, z as u32)), f64::from(z) * dz)
     }
 
-    /// A world position from the field's first sample on, metres.
+    /// Returns a world position relative to the field's first sample, metres.
     pub fn relative(&self, point: DVec3) -> DVec3 {
         point - DVec3::new(self.field.origin[0], 0.0, self.field.origin[1])
     }
 
-    /// What is known of a diamond.
+    /// Returns a diamond's data.
     #[inline]
-    pub fn known(&self, at: Place, index: usize) -> Known {
+    pub fn diamond(&self, at: Place, index: usize) -> DiamondInfo {
         if let Some(evaluated) = &self.evaluated {
             let Size { height, error, ball } = evaluated.size(at, index);
             let [x, z] = [0, 1].map(|k| f64::from(at[k]) * self.field.spacing[k]);
-            return Known { at, index, centre: DVec3::new(x, height, z), error, ball };
+            return DiamondInfo { at, index, centre: DVec3::new(x, height, z), error, ball };
         }
-        Known { at, index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
+        DiamondInfo { at, index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
     }
 
-    /// Whether a diamond may have a sphere. What is not worked out yet may.
+    /// Returns true if a diamond has a sphere. Returns true for every diamond of a procedural terrain.
     #[inline]
-    pub fn matters(&self, reach: &Reach, index: usize) -> bool {
-        self.is_endless() || reach.matters(self.errors[index])
+    pub fn has_sphere(&self, reach: &Reach, index: usize) -> bool {
+        self.is_endless() || reach.has_sphere(self.errors[index])
     }
 
-    /// Whether there are too many diamonds to keep something of each.
+    /// Returns true for procedural terrain, whose diamonds are too many to store.
     #[inline]
     pub fn is_endless(&self) -> bool {
         self.evaluated.is_some()
     }
 
-    /// The view with what rounding of vertices takes of its tolerance taken off; `None` if that is all of it.
+    /// Returns the view with its tolerance reduced by the rounding error of vertices; `None` if nothing is left.
     pub fn without_rounding(&self, view: &View) -> Option<View> {
         let (Some(evaluated), Some(terrain)) = (&self.evaluated, self.field.procedural()) else { return Some(*view) };
         let [low, high] = terrain.range_m();
@@ -193,16 +192,16 @@ impl Measured {
         (px > 0.0).then_some(View { tolerance: Tolerance { px, ..view.tolerance }, ..*view })
     }
 
-    /// Says which diamonds will be asked for.
-    pub fn look_ahead(&self, diamonds: &[(Place, usize)]) {
+    /// Precomputes the sizes of diamonds in parallel on procedural terrain.
+    pub fn precompute(&self, diamonds: &[(Place, usize)]) {
         if let Some(evaluated) = &self.evaluated {
-            evaluated.look_ahead(diamonds);
+            evaluated.precompute(diamonds);
         }
     }
 
-    /// Bytes of errors and balls.
+    /// Returns the memory for errors and balls, bytes.
     pub fn bytes(&self) -> usize {
-        let evaluated = self.evaluated.as_ref().map_or(0, |evaluated| evaluated.kept() * size_of::<(u64, Size)>());
+        let evaluated = self.evaluated.as_ref().map_or(0, |evaluated| evaluated.cached() * size_of::<(u64, Size)>());
         size_of_val(self.errors.as_slice()) + size_of_val(self.balls.as_slice()) + evaluated
     }
 }
@@ -219,61 +218,58 @@ mod tests {
     }
 
     /// Calls `visit` for every diamond.
-    fn each(measured: &Measured, mut visit: impl FnMut(Known)) {
+    fn each(measured: &Measured, mut visit: impl FnMut(DiamondInfo)) {
         for level in 0..measured.lattice.levels() {
             let [x_count, z_count] = measured.lattice.count(level);
             for (i, j) in (0..z_count).flat_map(|j| (0..x_count).map(move |i| (i, j))).filter(|(i, j)| (i | j) & 1 == 1)
             {
                 let at = [i << level, j << level];
-                visit(measured.known(at, measured.lattice.index(at).expect("a diamond")));
+                visit(measured.diamond(at, measured.lattice.index(at).expect("a diamond")));
             }
         }
     }
 
     #[test]
-    fn errors_and_balls_are_nested_whatever_the_size() {
+    fn errors_and_balls_are_nested_at_any_size() {
         for (size, band) in [([33, 33], 1.0), ([33, 33], 1.3), ([37, 21], 1.0), ([37, 21], 1.3), ([2, 30], 1.3)] {
             let measured = Measured::new(field(size), band, &Progress::default());
             let mut children = 0;
             each(&measured, |parent| {
                 let out = |at| measured.lattice.sticks_out(at);
                 for (at, index) in measured.lattice.children(parent.at) {
-                    let child = measured.known(at, index);
-                    let second_target = if !out(parent.at) && out(at) { band } else { 1.0 };
-                    let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(second_target);
-                    assert!(
-                        reach <= f64::from(parent.ball) && child.error * second_target <= parent.error,
-                        "{parent:?}"
-                    );
+                    let child = measured.diamond(at, index);
+                    let growth = if !out(parent.at) && out(at) { band } else { 1.0 };
+                    let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(growth);
+                    assert!(reach <= f64::from(parent.ball) && child.error * growth <= parent.error, "{parent:?}");
                     assert!(measured.lattice.parents(at).any(|(_, index)| index == parent.index), "{child:?}");
                     children += 1;
                 }
             });
-            // Each has two parents, but for those at the border and the root.
+            // Each diamond has two parents, except at the border and the root.
             assert!(children as u32 > size[0] * size[1]);
         }
     }
 
     #[test]
-    fn a_ball_holds_every_sample_that_its_wedges_cover() {
+    fn balls_contain_every_sample_under_their_wedges() {
         let progress = Progress::default();
-        let mut samples = holds_samples(&Measured::new(field([37, 21]), 1.0, &progress));
+        let mut samples = check_samples(&Measured::new(field([37, 21]), 1.0, &progress));
         assert_eq!(progress.share(), Some(1.0));
-        // Steep, so that a sample outside its wedge's ball shows, and sticking out by every length.
+        // Steep, so that a sample outside its wedge's ball is detected, and extending beyond the field by every length.
         for (w, h) in (20..40).flat_map(|w| [(w, 21), (w, 33), (13, w)]) {
             let size = [w, h];
             let heights = (0..w * h).map(|k| if (k * 7919) % 29 == 3 { 900.0 } else { 0.0 }).collect();
             let spiky = Field::new(Samples::F32(heights), size, [2.0, 3.0], Holes::none((w * h) as usize));
-            samples += holds_samples(&Measured::new(Arc::new(spiky), 1.0, &Progress::default()));
+            samples += check_samples(&Measured::new(Arc::new(spiky), 1.0, &Progress::default()));
         }
         assert!(samples > 5000, "{samples} samples in wedges");
     }
 
-    /// Holds the samples under every wedge against its ball and error. Returns how many there are.
-    fn holds_samples(measured: &Measured) -> usize {
+    /// Checks the samples under every wedge against its ball and error. Returns the number of samples.
+    fn check_samples(measured: &Measured) -> usize {
         let mut samples = 0;
-        each(measured, |known| {
-            let Diamond { ends, apexes } = Diamond::around(known.at);
+        each(measured, |diamond| {
+            let Diamond { ends, apexes } = Diamond::around(diamond.at);
             for apex in apexes.into_iter().filter(|&at| measured.lattice.contains(at)) {
                 let mut corners = [apex, ends[0], ends[1]].map(|at| {
                     let [x, z] = measured.lattice.on_field(at);
@@ -285,8 +281,8 @@ mod tests {
                 if surface::doubled_area(&corners) > 0 {
                     surface::visit_samples(&corners, |x, z, y| {
                         let sample = measured.centre([x as i32, z as i32]);
-                        assert!(sample.distance(known.centre) <= f64::from(known.ball), "{known:?}");
-                        assert!((y - sample.y).abs() <= f64::from(known.error), "{known:?}");
+                        assert!(sample.distance(diamond.centre) <= f64::from(diamond.ball), "{diamond:?}");
+                        assert!((y - sample.y).abs() <= f64::from(diamond.error), "{diamond:?}");
                         samples += 1;
                     });
                 }

@@ -1,10 +1,10 @@
-//! From split diamonds to triangles: down the binary tree of wedges, those in sight.
+//! Builds the triangles of split diamonds by descending the binary tree of wedges, with culling.
 //!
-//! Vertices that fade in go from the middle of their hypotenuse *as it is drawn* to their height over it:
-//! drawn(m) = mid(drawn(a), drawn(c)) + (1 − w)·(h(m) − mid(h(a), h(c))). A weight w is at least the weights of all that
-//! the vertex hangs on, so that the surface is the mean over t in 0..1 of the meshes of the vertices with w ≤ t. Each of
-//! these is conforming and holds all diamonds that must have split, so that each keeps the tolerance, and so does their
-//! mean. Where a vertex comes or goes, w is 1 and the surface the same with and without it.
+//! A vertex fades in from the middle of its hypotenuse *as drawn* to its own height: drawn(m) = mid(drawn(a), drawn(c))
+//! + (1 − w)·(h(m) − mid(h(a), h(c))). A vertex's weight w is at least the weights of all vertices it depends on. The
+//! surface is therefore the mean over t in 0..1 of the meshes of the vertices with w ≤ t. Each of these meshes is
+//! conforming and contains all diamonds that must have split. Each keeps the tolerance, and so does their mean. A
+//! vertex appears and disappears at w = 1, where the surface is the same with and without it.
 
 use std::ops::Range;
 
@@ -18,29 +18,29 @@ use super::reach::Viewpoint;
 use super::splits::Splits;
 use crate::draw::{Draw, DrawList, ExplicitVertex, Instance, Source, Topology};
 
-/// A corner of a wedge on its way.
+/// A corner of a wedge, with its fade.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Corner {
-    /// On the lattice.
+    /// Place on the lattice.
     pub at: Place,
-    /// Of the sample, metres.
+    /// Height of the sample, metres.
     height: f64,
     /// Middle of the hypotenuse as drawn, metres.
     target: f64,
-    /// Over that at the end of its way, metres.
-    over: f64,
+    /// Height above `target` when fully faded in, metres.
+    rise: f64,
     weight: f32,
 }
 
 impl Corner {
-    /// Height at which it is drawn, metres.
+    /// Returns the height at which the corner is drawn, metres.
     fn drawn(&self) -> f64 {
-        self.target + (1.0 - f64::from(self.weight)) * self.over
+        self.target + (1.0 - f64::from(self.weight)) * self.rise
     }
 
-    /// The vertex as it is drawn, its heights relative to `height_base` metres.
+    /// Returns the corner as a vertex with heights relative to `height_base`, metres.
     pub fn vertex(&self, lattice: &Lattice, height_base: f32) -> ExplicitVertex {
-        let height = if self.over + self.target == self.height { self.height } else { self.target + self.over };
+        let height = if self.rise + self.target == self.height { self.height } else { self.target + self.rise };
         let relative = |height: f64| (height - f64::from(height_base)) as f32;
         ExplicitVertex {
             position: lattice.on_field(self.at),
@@ -55,30 +55,30 @@ impl Corner {
 /// A wedge: the corner with the right angle first, counter-clockwise seen from above.
 pub type Wedge = [Corner; 3];
 
-/// The triangles of one draw.
+/// Triangles of one draw.
 #[derive(Default)]
 pub struct Piece {
     /// Vertices.
     pub vertices: Vec<ExplicitVertex>,
-    /// Three a triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
 }
 
-/// A viewpoint's mesh to be made.
+/// Inputs of the mesh for one viewpoint.
 pub struct Mesh<'a> {
     /// Heights and diamonds.
     pub measured: &'a Measured,
-    /// What has split.
+    /// Split diamonds.
     pub splits: &'a Splits,
-    /// What is in sight.
+    /// Visible blocks.
     pub blocks: &'a Blocks,
-    /// Where vertices fade in.
+    /// Viewpoint, which determines how far vertices have faded in.
     pub from: &'a Viewpoint,
 }
 
 impl Mesh<'_> {
-    /// Fills an empty list: a draw for the wedges larger than a block, and one for each block in sight, from its patch
-    /// where there are any.
+    /// Fills an empty list: one draw for all wedges larger than a block, and one for each visible block. Draws a
+    /// block's patch if `patches` has it.
     pub fn fill(&self, mut patches: Option<&mut Patches>, list: &mut DrawList) {
         let (mut large, mut small) = (Vec::new(), Vec::new());
         for wedge in self.roots() {
@@ -90,17 +90,17 @@ impl Mesh<'_> {
             wedges.iter().map(|(_, wedge)| wedge.map(|corner| corner.at)).collect()
         };
         let patch = |patches: &Option<&mut Patches>, wedges: &[(usize, Wedge)]| {
-            patches.as_ref().and_then(|patches| patches.of(wedges[0].0, &roots(wedges)))
+            patches.as_ref().and_then(|patches| patches.get(wedges[0].0, &roots(wedges)))
         };
         let changed: Vec<_> = blocks.iter().filter(|wedges| patch(&patches, wedges).is_none()).collect();
         let of_block = |wedges: &&&[(usize, Wedge)]| self.piece(wedges.iter().map(|(_, wedge)| wedge));
         let pieces: Vec<Piece> = changed.par_iter().map(of_block).collect();
-        push(list, self.loose(&large));
+        push(list, self.separate(&large));
         for (wedges, piece) in changed.into_iter().zip(pieces) {
-            let keep = |patches: &mut &mut Patches| {
-                patches.keep((wedges[0].0, roots(wedges)), &piece, self.blocks, &mut list.uploads)
+            let store = |patches: &mut &mut Patches| {
+                patches.store((wedges[0].0, roots(wedges)), &piece, self.blocks, &mut list.uploads)
             };
-            if !patches.as_mut().is_some_and(keep) {
+            if !patches.as_mut().is_some_and(store) {
                 push(list, piece);
             }
         }
@@ -109,36 +109,36 @@ impl Mesh<'_> {
         }
     }
 
-    /// The two halves of the root square.
+    /// Returns the two halves of the root square.
     pub fn roots(&self) -> [Wedge; 2] {
         let side = self.measured.lattice.side();
         let [a, b, c, d] = [[0, 0], [side, 0], [0, side], [side, side]].map(|at| self.sample(at));
-        // Seen from above with z to the south: the diagonal goes from the first corner to the last.
+        // Seen from above with z to the south, the diagonal runs from the first corner to the last.
         [[c, d, a], [b, a, d]]
     }
 
     fn sample(&self, at: Place) -> Corner {
         let height = self.measured.height(at);
-        Corner { at, height, target: height, over: 0.0, weight: 0.0 }
+        Corner { at, height, target: height, rise: 0.0, weight: 0.0 }
     }
 
-    /// The middle of a wedge's hypotenuse.
+    /// Returns the middle of a wedge's hypotenuse as a corner.
     fn middle(&self, a: &Corner, c: &Corner, at: Place, index: usize) -> Corner {
         let mut middle = self.sample(at);
         if self.from.band > 1.0 {
             let fades = !self.measured.lattice.sticks_out(at);
             middle.target = (a.drawn() + c.drawn()) / 2.0;
-            middle.over = middle.height - (a.height + c.height) / 2.0;
-            middle.weight = if fades { self.from.weight(&self.measured.known(at, index)) as f32 } else { 0.0 };
+            middle.rise = middle.height - (a.height + c.height) / 2.0;
+            middle.weight = if fades { self.from.weight(&self.measured.diamond(at, index)) as f32 } else { 0.0 };
         }
         middle
     }
 
-    /// The two halves of a wedge, if it has split.
+    /// Returns the two halves of a wedge; `None` if it has not split.
     pub fn halves(&self, [apex, left, right]: &Wedge) -> Option<[Wedge; 2]> {
         let sum = [0, 1].map(|k| left.at[k] + right.at[k]);
         if (sum[0] | sum[1]) & 1 == 1 {
-            // A cell's half.
+            // Half of a cell, the finest wedge.
             return None;
         }
         let at = sum.map(|n| n / 2);
@@ -147,28 +147,28 @@ impl Mesh<'_> {
         Some([[middle, *apex, *left], [middle, *right, *apex]])
     }
 
-    /// Sorts wedges in sight into those larger than a block and those within one.
+    /// Sorts visible wedges into those larger than a block and those within one.
     fn descend(&self, wedge: &Wedge, large: &mut Vec<Wedge>, small: &mut Vec<(usize, Wedge)>) {
         let corners = wedge.map(|corner| corner.at);
-        if self.blocks.hold(corners) {
-            small.extend(self.blocks.seen(corners).map(|block| (block, *wedge)));
+        if self.blocks.contain(corners) {
+            small.extend(self.blocks.visible_block(corners).map(|block| (block, *wedge)));
         } else if let Some(halves) = self.halves(wedge) {
             halves.iter().for_each(|half| self.descend(half, large, small));
-        } else if self.covers_a_seen_block(corners) {
+        } else if self.covers_a_visible_block(corners) {
             large.push(*wedge);
         }
     }
 
-    fn covers_a_seen_block(&self, wedge: [Place; 3]) -> bool {
-        if self.blocks.hold(wedge) {
-            return self.blocks.seen(wedge).is_some();
+    fn covers_a_visible_block(&self, wedge: [Place; 3]) -> bool {
+        if self.blocks.contain(wedge) {
+            return self.blocks.visible_block(wedge).is_some();
         }
         let [apex, left, right] = wedge;
         let middle = [0, 1].map(|k| (left[k] + right[k]) / 2);
-        [[middle, apex, left], [middle, right, apex]].into_iter().any(|half| self.covers_a_seen_block(half))
+        [[middle, apex, left], [middle, right, apex]].into_iter().any(|half| self.covers_a_visible_block(half))
     }
 
-    /// The triangles under wedges of one block.
+    /// Returns the triangles of the wedges of one block, with shared vertices.
     fn piece<'w>(&self, wedges: impl Iterator<Item = &'w Wedge>) -> Piece {
         let mut leaves = Vec::new();
         for wedge in wedges {
@@ -199,8 +199,8 @@ impl Mesh<'_> {
         piece
     }
 
-    /// Triangles that share no vertices.
-    fn loose(&self, wedges: &[Wedge]) -> Piece {
+    /// Returns triangles without shared vertices.
+    fn separate(&self, wedges: &[Wedge]) -> Piece {
         let mut piece = Piece::default();
         for corner in wedges.iter().filter(|wedge| self.has_area(wedge)).flatten() {
             piece.indices.push(piece.vertices.len() as u32);
@@ -209,13 +209,13 @@ impl Mesh<'_> {
         piece
     }
 
-    /// Whether a wedge does not collapse onto the field's edge.
+    /// Returns true if a wedge does not collapse onto the field's edge.
     fn has_area(&self, wedge: &Wedge) -> bool {
         !self.measured.lattice.collapses(wedge.map(|corner| corner.at))
     }
 }
 
-/// Adds a draw of a piece, if it has triangles.
+/// Appends a draw of a piece if it has triangles.
 pub fn push(list: &mut DrawList, piece: Piece) {
     let (first_vertex, first) = (list.streamed.vertices.len() as u32, list.streamed.indices.len() as u32);
     list.streamed.vertices.extend(piece.vertices);

@@ -1,24 +1,27 @@
-//! Spheres: a binary triangle tree whose wedges split where the viewpoint is inside their spheres.
+//! Sphere tree: a binary triangle tree whose wedges split while the eye is inside their spheres.
 //!
-//! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II. A wedge that has an error on the screen
-//! above the tolerance when the eye is near enough has a sphere around it: inside it splits, outside it merges. Two
-//! wedges that share a hypotenuse split together, so one sphere serves both, about the middle of that hypotenuse
-//! ([`lattice`]). What has split is thus a function of the eye's place alone. Which spheres it may have crossed is found
-//! in four ways, with the same triangles: made-up spheres about the viewpoint that group those it cannot have crossed
-//! ([`bounding_spheres`]); the same for those that lie behind no other one, as the lecture has it, which costs more than it saves
-//! ([`covers`]); ROAM's two queues ([`roam`]); and every sphere anew ([`splits`]).
+//! Based on J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part II. Each wedge has a sphere outside of
+//! which its screen-space error is below the tolerance. It splits when the eye enters the sphere and merges when the
+//! eye leaves it. Two wedges that share a hypotenuse split together, so one sphere about the middle of that hypotenuse
+//! serves both ([`lattice`]). The split wedges are therefore a function of the eye's position alone. Crossed spheres
+//! are found by one of four criteria, which draw the same triangles:
+//! - bounding spheres about past viewpoints that group spheres the eye cannot have crossed ([`bounding_spheres`]);
+//! - the lecture's hierarchy of nested spheres, which costs more than it saves ([`covers`]);
+//! - ROAM's two queues ([`roam`]);
+//! - a check of every sphere ([`splits`]).
 //!
-//! Where this differs from the lecture, and why:
-//! - the lecture's functions are its application's; here a sphere's radius follows from an error measured at every
-//!   sample ([`measure`]) and the view's tolerance, `certified` or as published elsewhere ([`reach`]);
-//! - spheres are nested over both parents of a diamond, not only in the tree. So no split is ever forced by a neighbour:
-//!   it is inside its own sphere already, and no order of crossings matters;
-//! - any size of field: the root square may be larger, and its vertices beyond the field fall onto its edge;
-//! - `morph=on` lets vertices fade in over a band around their spheres ([`mesh`]), but for those of diamonds that stick
-//!   out of the field;
-//! - triangles out of sight are left out, by blocks.
+//! Differences from the lecture:
+//! - The lecture leaves the radius to the application. Here it follows from an error measured at every sample
+//!   ([`measure`]) and the view's tolerance, under the metric `certified` or the paper's ([`reach`]).
+//! - Spheres are nested over both parents of a diamond, not only in the tree. A neighbour therefore never forces a
+//!   split, and the order of crossings does not matter.
+//! - Fields may have any size. The root square may be larger; its vertices beyond the field collapse onto the field's
+//!   edge.
+//! - `morph=on` fades vertices in over a band around their spheres ([`mesh`]), except for those of diamonds that extend
+//!   beyond the field.
+//! - Invisible triangles are culled by blocks.
 //!
-//! Laws kept: watertight, covered once, error within tolerance, no state between views (`hold=off`).
+//! Invariants: watertight; the field is covered once; error within tolerance; no state between views (`hold=off`).
 
 pub mod blocks;
 pub mod bounding_spheres;
@@ -46,21 +49,22 @@ use self::patches::Patches;
 use self::reach::{Reach, Viewpoint};
 use self::roam::Queues;
 use self::splits::{Changes, Found, Splits};
-use super::{Entry, Setting, Settings, Technique, Values, select_within_limits};
+use super::{Diagnostics, Entry, Gradual, Setting, Settings, Technique, Values, select_within_limits};
 use crate::draw::{DrawKinds, DrawList, Geometry, Limits, Normals, PipelineRequirements};
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
 
-/// Vertices fade in over so many times a sphere's radius: a wider band draws more, a narrower one is seen.
+/// Vertices fade in between this multiple of a sphere's radius and the sphere. A wider band draws more, a narrower one
+/// is noticeable.
 const BAND: f32 = 1.3;
-/// Diamonds that have split stay so up to this many times a sphere's radius, if they are held.
+/// With `hold=on`, split diamonds merge at this multiple of a sphere's radius.
 const HOLD: f64 = 1.1;
-/// The most diamonds that split, whatever the tolerance: buffers are made for them. Beyond it the tolerance is widened.
+/// Maximum number of split diamonds, for which buffers are allocated. The tolerance is scaled until they suffice.
 const MAX_SPLITS: usize = 1 << 20;
-/// The same of a land without end, whose diamonds are worked out as they are met.
-const MAX_OPEN_SPLITS: usize = 1 << 17;
+/// Maximum number of split diamonds of a procedural terrain, whose diamonds are computed on demand.
+const MAX_PROCEDURAL_SPLITS: usize = 1 << 17;
 
-/// The row of the table.
+/// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {
     name: "sphere-tree",
     about: "binary triangle tree: a wedge splits where the eye is inside its sphere",
@@ -71,25 +75,25 @@ pub const ENTRY: Entry = Entry {
             key: "criterion",
             values: Values::Words(&["spheres", "covers", "roam", "plain"]),
             default: "spheres",
-            about: "how crossed spheres are found: by made-up ones, behind others, by two queues, or among all; same triangles",
+            about: "how crossed spheres are found: bounding spheres, nested spheres, ROAM's queues, or a check of all; same triangles",
         },
         Setting {
             key: "morph",
             values: Values::Words(&["off", "on"]),
             default: "off",
-            about: "whether vertices come at once or fade in around their spheres",
+            about: "off: vertices appear at once; on: they fade in around their spheres",
         },
         Setting {
             key: "hold",
             values: Values::Words(&["off", "on"]),
             default: "off",
-            about: "whether a wedge merges a little further away than it splits",
+            about: "on: a wedge merges at a slightly greater distance than it splits",
         },
         Setting {
             key: "patches",
             values: Values::Words(&["streamed", "resident"]),
             default: "streamed",
-            about: "whether all triangles are sent in each frame, or, of a land with samples, blocks that changed",
+            about: "streamed: upload all triangles each frame; resident: only changed blocks (not for procedural terrain)",
         },
     ],
     needs: &[],
@@ -99,7 +103,7 @@ pub const ENTRY: Entry = Entry {
     build: |field, settings| Box::new(SphereTree::new(field, settings)),
 };
 
-/// How the split diamonds are found.
+/// Method of finding the split diamonds.
 enum Criterion {
     Spheres(Follower<BoundingSpheres>),
     Covers(Follower<Covers>),
@@ -114,11 +118,11 @@ struct SphereTree {
     band: f64,
     hold: f64,
     limits: Limits,
-    /// What stays on the device, unless all is streamed.
+    /// Geometry that stays on the device; `None` if all is streamed.
     patches: Option<Patches>,
-    nothing: Geometry,
+    empty: Geometry,
     /// Bytes of vertices and indices in the last list.
-    sent: usize,
+    sent_bytes: usize,
 }
 
 impl Criterion {
@@ -175,13 +179,13 @@ impl SphereTree {
         let is_resident = settings.word("patches") == "resident" && !measured.is_endless();
         let patches = is_resident.then(|| Patches::new(blocks.number(), &limits));
         limits.upload_bytes = patches.as_ref().map_or(0, Patches::upload_bytes);
-        let (band, nothing) = (f64::from(band), Geometry::default());
-        Self { measured, blocks, criterion, band, hold, limits, patches, nothing, sent: 0 }
+        let (band, empty) = (f64::from(band), Geometry::default());
+        Self { measured, blocks, criterion, band, hold, limits, patches, empty, sent_bytes: 0 }
     }
 }
 
-/// A split makes two triangles more. A block's pieces have two vertices more than triangles at most, and larger wedges
-/// three each.
+/// Upper bounds of a list. Each split adds two triangles. A block's piece has at most two vertices more than triangles;
+/// larger wedges have three vertices each.
 fn limits(measured: &Measured, blocks: &Blocks) -> Limits {
     let [w, h] = measured.field.size().map(|n| n as usize);
     let triangles = (2 * (w - 1) * (h - 1)).min(2 * max_splits(measured) + 2);
@@ -192,12 +196,12 @@ fn limits(measured: &Measured, blocks: &Blocks) -> Limits {
 }
 
 fn max_splits(measured: &Measured) -> usize {
-    if measured.is_endless() { MAX_OPEN_SPLITS } else { MAX_SPLITS }
+    if measured.is_endless() { MAX_PROCEDURAL_SPLITS } else { MAX_SPLITS }
 }
 
 impl Technique for SphereTree {
     fn resident(&self) -> &Geometry {
-        self.patches.as_ref().map_or(&self.nothing, Patches::geometry)
+        self.patches.as_ref().map_or(&self.empty, Patches::geometry)
     }
 
     fn limits(&self) -> Limits {
@@ -211,7 +215,7 @@ impl Technique for SphereTree {
             self.criterion.follow(&self.measured, &from, max_splits(&self.measured)).then_some(from)
         });
         list.tolerance_scale = tolerance_scale;
-        self.blocks.look(view);
+        self.blocks.update_visibility(view);
         let changes = self.criterion.changes();
         let Self { measured, blocks, criterion, patches, .. } = self;
         if let Some(patches) = patches {
@@ -219,15 +223,11 @@ impl Technique for SphereTree {
         }
         let mesh = Mesh { measured, splits: criterion.splits(), blocks, from: &from };
         match measured.field.procedural() {
-            Some(terrain) => mesh.fill_open(terrain, view, list),
+            Some(terrain) => mesh.fill_procedural(terrain, view, list),
             None => mesh.fill(patches.as_mut(), list),
         }
         let size = list.size();
-        self.sent = size.upload_bytes + patches::bytes(size.vertices, size.indices);
-    }
-
-    fn is_settled(&self) -> bool {
-        !self.patches.as_ref().is_some_and(Patches::waits)
+        self.sent_bytes = size.upload_bytes + patches::bytes(size.vertices, size.indices);
     }
 
     fn keeps_tolerance(&self) -> bool {
@@ -239,11 +239,27 @@ impl Technique for SphereTree {
         PipelineRequirements { draws: DrawKinds::EXPLICIT, normals, ..PipelineRequirements::default() }
     }
 
+    fn gradual(&self) -> Option<&dyn Gradual> {
+        Some(self)
+    }
+
+    fn diagnostics(&self) -> Option<&dyn Diagnostics> {
+        Some(self)
+    }
+}
+
+impl Gradual for SphereTree {
+    fn is_settled(&self) -> bool {
+        !self.patches.as_ref().is_some_and(Patches::is_pending)
+    }
+}
+
+impl Diagnostics for SphereTree {
     fn stats(&self) -> Vec<(&'static str, f64, &'static str)> {
         vec![
             ("wedges visited for the last view", 2.0 * self.criterion.visited() as f64, ""),
             ("wedges split in the last view", 2.0 * self.criterion.splits().count() as f64, ""),
-            ("bytes of triangles sent for the last view", self.sent as f64, "B"),
+            ("bytes of triangles sent for the last view", self.sent_bytes as f64, "B"),
             ("bytes of errors and balls", self.measured.bytes() as f64, "B"),
         ]
     }

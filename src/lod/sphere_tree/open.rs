@@ -1,7 +1,7 @@
-//! The triangles of a land without end: no table of blocks says what is in sight, so a wedge's ball does.
+//! Builds the mesh of procedural terrain, culling wedges by their balls because no table of blocks exists.
 //!
-//! The balls of wedges are nested: one out of sight has nothing in sight below it, and a wider tolerance never draws
-//! more. Vertices carry normals, as there is no texture of heights to light them by.
+//! Balls are nested: nothing below an invisible wedge is visible, and a greater tolerance never draws more. Vertices
+//! have normals, because no height texture exists to compute them from.
 
 use std::collections::HashMap;
 
@@ -15,13 +15,13 @@ use crate::draw::{DrawList, ExplicitVertex, VertexNormals};
 use crate::height::bezier::{Bezier, SPACING_M};
 use crate::view::{Lens, View};
 
-/// Slopes are those of the land without what is narrower than so many pixels: triangles are not much smaller.
+/// Width of the filter for normals, pixels. Triangles are not much smaller than this.
 const SMOOTHED_PX: f64 = 6.0;
 
 impl Mesh<'_> {
-    /// Fills an empty list: one draw.
-    pub fn fill_open(&self, terrain: &Bezier, view: &View, list: &mut DrawList) {
-        // The height of the land nearest the eye's: no vertex is further from it than from the eye.
+    /// Fills an empty list with one draw.
+    pub fn fill_procedural(&self, terrain: &Bezier, view: &View, list: &mut DrawList) {
+        // The terrain height nearest the eye's. No vertex is further from it than from the eye.
         let [low, high] = terrain.range_m();
         list.height_base = view.eye.y.clamp(low, high) as f32;
         let (mut piece, mut numbers) = (Piece::default(), HashMap::new());
@@ -43,9 +43,9 @@ impl Mesh<'_> {
         push(list, piece);
     }
 
-    /// Calls `visit` for the wedges in sight that have not split.
+    /// Calls `visit` for the visible wedges that have not split.
     fn walk(&self, wedge: &Wedge, view: &View, visit: &mut impl FnMut(&Wedge)) {
-        if !self.may_be_seen(wedge, view) {
+        if !self.may_be_visible(wedge, view) {
             return;
         }
         match self.halves(wedge) {
@@ -54,14 +54,14 @@ impl Mesh<'_> {
         }
     }
 
-    /// Whether the ball of a wedge's diamond reaches into what can be seen.
-    fn may_be_seen(&self, [_, left, right]: &Wedge, view: &View) -> bool {
+    /// Returns true if the ball of a wedge's diamond intersects the view volume.
+    fn may_be_visible(&self, [_, left, right]: &Wedge, view: &View) -> bool {
         let sum = [0, 1].map(|k| left.at[k] + right.at[k]);
         let index = self.measured.lattice.index(sum.map(|n| n / 2)).filter(|_| (sum[0] | sum[1]) & 1 == 0);
         let Some(index) = index else { return true };
-        let known = self.measured.known(sum.map(|n| n / 2), index);
-        let from_eye = known.centre - self.from.eye;
-        view.planes().iter().all(|(normal, offset)| normal.dot(from_eye) + offset >= -f64::from(known.ball))
+        let diamond = self.measured.diamond(sum.map(|n| n / 2), index);
+        let from_eye = diamond.centre - self.from.eye;
+        view.planes().iter().all(|(normal, offset)| normal.dot(from_eye) + offset >= -f64::from(diamond.ball))
     }
 }
 

@@ -1,25 +1,25 @@
-//! Patches: the triangles of a block, kept on the device until a wedge in it splits or merges.
+//! Patches: triangles of a block, kept on the device until a wedge in the block splits or merges.
 //!
-//! A block in sight that changed is built anew. Where it came out the same, nothing is sent; else its triangles are
-//! uploaded whole. What a frame's uploads or the device's memory have no room for is streamed, so that nothing ever
-//! waits. Vertices that fade in change with every step of the eye: their blocks are all built anew.
+//! A visible block that changed is rebuilt. If the result is the same, nothing is uploaded, otherwise all its triangles
+//! are. Blocks that exceed the frame's upload budget or the device memory are streamed, so nothing is ever missing.
+//! Vertices that fade in change with every movement of the eye, so their blocks are all rebuilt.
 //!
-//! Bytes sent and selection's time, medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m above ground:
+//! Uploaded bytes and selection time, medians of 200 frames over 2049 × 2049 samples 10 m apart, 30 m above ground:
 //!
-//! | wedges (triangles in sight) | eye | streamed | patches |
+//! | wedges (visible triangles) | eye | streamed | patches |
 //! |---|---|---|---|
 //! | 10⁴ (4 k) | 0.05 m a frame | 129 kB, 0.86 ms | 4.9 kB, 0.28 ms |
 //! | | 5 m a frame | 111 kB, 0.86 ms | 46 kB, 0.56 ms |
-//! | | leaps | 119 kB, 4.1 ms | 111 kB, 3.6 ms |
+//! | | teleports | 119 kB, 4.1 ms | 111 kB, 3.6 ms |
 //! | 10⁵ (27 k) | 0.05 m a frame | 789 kB, 2.5 ms | 7.1 kB, 0.33 ms |
 //! | | 5 m a frame | 717 kB, 2.9 ms | 271 kB, 1.3 ms |
-//! | | leaps | 719 kB, 40 ms | 699 kB, 39 ms |
+//! | | teleports | 719 kB, 40 ms | 699 kB, 39 ms |
 //! | 10⁶ (251 k) | 0.05 m a frame | 6.8 MB, 23 ms | 86 kB, 1.0 ms |
 //! | | 5 m a frame | 5.9 MB, 22 ms | 2.8 MB, 13 ms |
-//! | | leaps | 4.7 MB, 358 ms | 4.7 MB, 357 ms |
+//! | | teleports | 4.7 MB, 358 ms | 4.7 MB, 357 ms |
 //!
-//! Where nearly all blocks change (tens of metres a frame) what is copied on the device is lost: on llvmpipe 7.1 instead of
-//! 5.2 ms of device time for 17 k triangles, 35 instead of 35 for 203 k.
+//! If nearly all blocks change (tens of metres a frame), the copy on the device is wasted. On llvmpipe the device time
+//! is 7.1 ms instead of 5.2 ms for 17 k triangles, and 35 ms either way for 203 k.
 
 use std::ops::Range;
 
@@ -32,35 +32,35 @@ use super::mesh::Piece;
 use super::splits::Changes;
 use crate::draw::{ExplicitVertex, Geometry, Limits, Upload};
 
-/// The most bytes uploaded in a frame: a staging buffer of this size is made for each frame in flight.
+/// Maximum number of bytes uploaded in a frame. Each frame in flight has a staging buffer of this size.
 const UPLOAD_BYTES: usize = 32 << 20;
 
-/// The triangles of a block on the device.
+/// Triangles of a block on the device.
 struct Patch {
-    /// The wedges of the block that they lie under.
+    /// Wedges of the block that contain the triangles.
     roots: Vec<[Place; 3]>,
-    /// Which vertices.
+    /// Range of its vertices.
     vertices: Range<u32>,
-    /// Which indices.
+    /// Range of its indices.
     indices: Range<u32>,
-    /// Whether a wedge of the block has changed since.
+    /// True if a wedge of the block has changed since the upload.
     is_stale: bool,
 }
 
-/// What blocks have on the device.
+/// Patches of all blocks.
 pub struct Patches {
     geometry: Geometry,
     free_vertices: RangeAllocator<u32>,
     free_indices: RangeAllocator<u32>,
-    of_blocks: Vec<Option<Patch>>,
+    by_block: Vec<Option<Patch>>,
     /// Bytes that the frame may still upload.
-    left: usize,
-    /// Whether a block was streamed because they did not suffice.
-    waits: bool,
+    budget: usize,
+    /// True if a block was streamed because the upload budget was exhausted.
+    is_pending: bool,
 }
 
 impl Patches {
-    /// None yet, with room for what a list may stream.
+    /// Creates an empty set with capacity for the maximum that a list may stream.
     pub fn new(blocks: usize, limits: &Limits) -> Self {
         let (vertices, indices) = (limits.vertices, limits.indices);
         Self {
@@ -71,96 +71,98 @@ impl Patches {
             },
             free_vertices: RangeAllocator::new(0..vertices as u32),
             free_indices: RangeAllocator::new(0..indices as u32),
-            of_blocks: std::iter::repeat_with(|| None).take(blocks).collect(),
-            left: 0,
-            waits: false,
+            by_block: std::iter::repeat_with(|| None).take(blocks).collect(),
+            budget: 0,
+            is_pending: false,
         }
     }
 
-    /// What is on the device.
+    /// Returns the geometry on the device.
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    /// The most bytes uploaded in a frame.
+    /// Returns the maximum number of bytes uploaded in a frame.
     pub fn upload_bytes(&self) -> usize {
         UPLOAD_BYTES.min(bytes(self.geometry.vertices.len(), self.geometry.indices.len()))
     }
 
-    /// Whether a block was streamed for want of uploads: it is a patch in the next frame.
-    pub fn waits(&self) -> bool {
-        self.waits
+    /// Returns true if a block was streamed because the upload budget was exhausted. It becomes a patch in a later
+    /// frame.
+    pub fn is_pending(&self) -> bool {
+        self.is_pending
     }
 
-    /// A new frame, before which these diamonds split or merged.
+    /// Begins a frame. `changes` lists the diamonds that split or merged since the last one.
     pub fn begin(&mut self, changes: &Changes, fades: bool, blocks: &Blocks) {
-        (self.left, self.waits) = (self.upload_bytes(), false);
+        (self.budget, self.is_pending) = (self.upload_bytes(), false);
         if changes.all || fades {
-            self.of_blocks.iter_mut().flatten().for_each(|patch| patch.is_stale = true);
+            self.by_block.iter_mut().flatten().for_each(|patch| patch.is_stale = true);
             return;
         }
         for middle in &changes.middles {
-            // On a line between blocks it belongs to both sides. Larger wedges than a block's show in its roots.
+            // A middle on the line between blocks belongs to both. Changes of wedges larger than a block show in the
+            // block's roots.
             let [i, j] = [0, 1].map(|k| (middle[k] - 1).div_euclid(blocks.side)..=middle[k] / blocks.side);
             for (i, j) in j.flat_map(|j| i.clone().map(move |i| (i, j))) {
                 if (0..blocks.count[0]).contains(&i) && (0..blocks.count[1]).contains(&j) {
                     let block = blocks.drawn_with((j * blocks.count[0] + i) as usize);
-                    self.of_blocks[block].iter_mut().for_each(|patch| patch.is_stale = true);
+                    self.by_block[block].iter_mut().for_each(|patch| patch.is_stale = true);
                 }
             }
         }
     }
 
-    /// The first vertex and the indices of a block's patch, if it is what lies under these wedges.
-    pub fn of(&self, block: usize, roots: &[[Place; 3]]) -> Option<(u32, Range<u32>)> {
-        let patch = self.of_blocks[block].as_ref().filter(|patch| !patch.is_stale && patch.roots == roots)?;
+    /// Returns the first vertex and the indices of a block's patch if it is current and contains exactly these wedges.
+    pub fn get(&self, block: usize, roots: &[[Place; 3]]) -> Option<(u32, Range<u32>)> {
+        let patch = self.by_block[block].as_ref().filter(|patch| !patch.is_stale && patch.roots == roots)?;
         Some((patch.vertices.start, patch.indices.clone()))
     }
 
-    /// Makes a piece the patch of a block, if there is room: says whether there was.
-    pub fn keep(
+    /// Stores a piece as the patch of a block. Returns false if the upload budget or the memory is exhausted.
+    pub fn store(
         &mut self,
         (block, roots): (usize, Vec<[Place; 3]>),
         piece: &Piece,
         blocks: &Blocks,
         uploads: &mut Vec<Upload>,
     ) -> bool {
-        if let Some(patch) = self.of_blocks[block].as_mut().filter(|patch| holds(&self.geometry, patch, piece)) {
+        if let Some(patch) = self.by_block[block].as_mut().filter(|patch| is_unchanged(&self.geometry, patch, piece)) {
             (patch.roots, patch.is_stale) = (roots, false);
             return true;
         }
-        self.drop(block);
+        self.free(block);
         let bytes = bytes(piece.vertices.len(), piece.indices.len());
-        if bytes > self.left {
-            self.waits = true;
+        if bytes > self.budget {
+            self.is_pending = true;
             return false;
         }
-        let Some([vertices, indices]) = self.room_for(piece, blocks) else { return false };
-        self.left -= bytes;
+        let Some([vertices, indices]) = self.allocate_or_evict(piece, blocks) else { return false };
+        self.budget -= bytes;
         self.geometry.vertices[usizes(&vertices)].copy_from_slice(&piece.vertices);
         self.geometry.indices[usizes(&indices)].copy_from_slice(&piece.indices);
         uploads.push(Upload::Vertices(vertices.start, piece.vertices.clone()));
         uploads.push(Upload::Indices(indices.start, piece.indices.clone()));
-        self.of_blocks[block] = Some(Patch { roots, vertices, indices, is_stale: false });
+        self.by_block[block] = Some(Patch { roots, vertices, indices, is_stale: false });
         true
     }
 
-    fn room_for(&mut self, piece: &Piece, blocks: &Blocks) -> Option<[Range<u32>; 2]> {
+    fn allocate_or_evict(&mut self, piece: &Piece, blocks: &Blocks) -> Option<[Range<u32>; 2]> {
         if piece.indices.is_empty() {
             return Some([0..0, 0..0]);
         }
-        self.take(piece).or_else(|| {
-            // Nothing in sight relies on these.
+        self.allocate(piece).or_else(|| {
+            // No visible block uses these.
             let is_spare = |block: &usize| {
-                self.of_blocks[*block].as_ref().is_some_and(|patch| patch.is_stale || !blocks.is_seen(*block))
+                self.by_block[*block].as_ref().is_some_and(|patch| patch.is_stale || !blocks.is_visible(*block))
             };
-            let spare: Vec<_> = (0..self.of_blocks.len()).filter(is_spare).collect();
-            spare.into_iter().for_each(|block| self.drop(block));
-            self.take(piece)
+            let spare: Vec<_> = (0..self.by_block.len()).filter(is_spare).collect();
+            spare.into_iter().for_each(|block| self.free(block));
+            self.allocate(piece)
         })
     }
 
-    fn take(&mut self, piece: &Piece) -> Option<[Range<u32>; 2]> {
+    fn allocate(&mut self, piece: &Piece) -> Option<[Range<u32>; 2]> {
         let vertices = self.free_vertices.allocate_range(piece.vertices.len() as u32).ok()?;
         let Ok(indices) = self.free_indices.allocate_range(piece.indices.len() as u32) else {
             self.free_vertices.free_range(vertices);
@@ -169,8 +171,8 @@ impl Patches {
         Some([vertices, indices])
     }
 
-    fn drop(&mut self, block: usize) {
-        if let Some(patch) = self.of_blocks[block].take().filter(|patch| !patch.indices.is_empty()) {
+    fn free(&mut self, block: usize) {
+        if let Some(patch) = self.by_block[block].take().filter(|patch| !patch.indices.is_empty()) {
             self.free_vertices.free_range(patch.vertices);
             self.free_indices.free_range(patch.indices);
         }
@@ -181,13 +183,13 @@ fn usizes(range: &Range<u32>) -> Range<usize> {
     range.start as usize..range.end as usize
 }
 
-/// Bytes of so many vertices and indices.
+/// Returns the bytes of this number of vertices and indices.
 pub fn bytes(vertices: usize, indices: usize) -> usize {
     vertices * size_of::<ExplicitVertex>() + indices * size_of::<u32>()
 }
 
-/// Whether a piece is what a patch has on the device already.
-fn holds(geometry: &Geometry, patch: &Patch, piece: &Piece) -> bool {
+/// Returns true if a patch already contains a piece.
+fn is_unchanged(geometry: &Geometry, patch: &Patch, piece: &Piece) -> bool {
     let vertices = &geometry.vertices[usizes(&patch.vertices)];
     cast_slice::<_, u8>(vertices) == cast_slice::<_, u8>(&piece.vertices)
         && geometry.indices[usizes(&patch.indices)] == piece.indices
@@ -215,72 +217,72 @@ mod tests {
         Patches::new(16, &Limits { vertices, indices: 3 * vertices, ..Limits::default() })
     }
 
-    /// Says whether there was room, and how much was sent.
-    fn keep(patches: &mut Patches, block: usize, piece: &Piece, blocks: &Blocks) -> (bool, usize) {
+    /// Returns the result of `store` and the number of uploads.
+    fn store(patches: &mut Patches, block: usize, piece: &Piece, blocks: &Blocks) -> (bool, usize) {
         let mut uploads = Vec::new();
-        (patches.keep((block, ROOTS.to_vec()), piece, blocks, &mut uploads), uploads.len())
+        (patches.store((block, ROOTS.to_vec()), piece, blocks, &mut uploads), uploads.len())
     }
 
     #[test]
-    fn what_came_out_the_same_is_not_sent_again() {
+    fn unchanged_patches_are_not_uploaded_again() {
         let (blocks, mut patches) = (blocks(), patches(100));
         let all = Changes { all: true, middles: Vec::new() };
         patches.begin(&all, false, &blocks);
-        assert_eq!(keep(&mut patches, 5, &piece(40, 1.0), &blocks), (true, 2));
-        assert_eq!(patches.of(5, &ROOTS), Some((0, 0..120)));
+        assert_eq!(store(&mut patches, 5, &piece(40, 1.0), &blocks), (true, 2));
+        assert_eq!(patches.get(5, &ROOTS), Some((0, 0..120)));
         patches.begin(&all, false, &blocks);
-        assert_eq!(patches.of(5, &ROOTS), None);
-        assert_eq!(keep(&mut patches, 5, &piece(40, 1.0), &blocks), (true, 0));
+        assert_eq!(patches.get(5, &ROOTS), None);
+        assert_eq!(store(&mut patches, 5, &piece(40, 1.0), &blocks), (true, 0));
         patches.begin(&all, false, &blocks);
-        assert_eq!(keep(&mut patches, 5, &piece(40, 2.0), &blocks), (true, 2));
+        assert_eq!(store(&mut patches, 5, &piece(40, 2.0), &blocks), (true, 2));
         assert_eq!(patches.geometry().vertices[39].height, 2.0);
     }
 
-    /// A diamond on the line between two blocks changes both, one inside changes its own.
+    /// A diamond on the line between two blocks changes both; one inside changes its own.
     #[test]
-    fn what_changed_is_stale_and_nothing_else() {
+    fn only_changed_blocks_are_stale() {
         let (blocks, mut patches) = (blocks(), patches(1000));
         patches.begin(&Changes::default(), false, &blocks);
-        (0..16).for_each(|block| assert!(keep(&mut patches, block, &piece(20, 1.0), &blocks).0));
+        (0..16).for_each(|block| assert!(store(&mut patches, block, &piece(20, 1.0), &blocks).0));
         for (middle, stale) in [([32, 8], vec![0, 1]), ([33, 33], vec![5]), ([8, 64], vec![4, 8]), ([0, 40], vec![4])] {
             patches.begin(&Changes { all: false, middles: vec![middle] }, false, &blocks);
-            let found: Vec<_> = (0..16).filter(|&block| patches.of(block, &ROOTS).is_none()).collect();
+            let found: Vec<_> = (0..16).filter(|&block| patches.get(block, &ROOTS).is_none()).collect();
             assert_eq!(found, stale, "{middle:?}");
-            stale.into_iter().for_each(|block| assert!(keep(&mut patches, block, &piece(20, 1.0), &blocks).0));
+            stale.into_iter().for_each(|block| assert!(store(&mut patches, block, &piece(20, 1.0), &blocks).0));
         }
-        assert_eq!(patches.of(5, &[]), None, "under other wedges");
+        assert_eq!(patches.get(5, &[]), None, "under other wedges");
     }
 
-    /// What does not fit is streamed; what is out of sight gives way first. Nothing overlaps and nothing leaks.
+    /// Streams what does not fit, after invisible blocks are evicted. Patches neither overlap nor leak.
     #[test]
     fn a_full_device_streams_the_rest() {
         let (mut blocks, mut patches) = (blocks(), patches(100));
-        blocks.see(&(0..8).collect::<Vec<_>>());
+        blocks.set_visible(&(0..8).collect::<Vec<_>>());
         patches.begin(&Changes::default(), false, &blocks);
-        assert!(keep(&mut patches, 9, &piece(40, 1.0), &blocks).0, "out of sight");
-        assert!(keep(&mut patches, 0, &piece(40, 1.0), &blocks).0);
+        assert!(store(&mut patches, 9, &piece(40, 1.0), &blocks).0, "invisible");
+        assert!(store(&mut patches, 0, &piece(40, 1.0), &blocks).0);
         patches.begin(&Changes::default(), false, &blocks);
-        assert!(keep(&mut patches, 1, &piece(40, 1.0), &blocks).0);
-        assert_eq!(patches.of(9, &ROOTS), None);
-        assert_eq!(keep(&mut patches, 2, &piece(40, 1.0), &blocks), (false, 0));
-        assert!(!patches.waits(), "it will not fit in the next frame");
-        let [a, b] = [0, 1].map(|block| patches.of(block, &ROOTS).unwrap().1);
+        assert!(store(&mut patches, 1, &piece(40, 1.0), &blocks).0);
+        assert_eq!(patches.get(9, &ROOTS), None);
+        assert_eq!(store(&mut patches, 2, &piece(40, 1.0), &blocks), (false, 0));
+        assert!(!patches.is_pending(), "it will not fit in the next frame");
+        let [a, b] = [0, 1].map(|block| patches.get(block, &ROOTS).unwrap().1);
         assert!(a.end <= b.start || b.end <= a.start);
         for round in 0..100 {
             patches.begin(&Changes { all: true, middles: Vec::new() }, false, &blocks);
-            assert!(keep(&mut patches, round % 8, &piece(90, round as f32), &blocks).0);
+            assert!(store(&mut patches, round % 8, &piece(90, round as f32), &blocks).0);
         }
     }
 
     #[test]
-    fn a_frame_s_uploads_end_and_the_rest_waits() {
+    fn uploads_of_a_frame_are_limited() {
         let (blocks, mut patches) = (blocks(), patches(4 * UPLOAD_BYTES / 40));
         patches.begin(&Changes::default(), false, &blocks);
         let large = piece(UPLOAD_BYTES / 60, 1.0);
-        assert!(keep(&mut patches, 0, &large, &blocks).0);
-        assert_eq!((keep(&mut patches, 1, &large, &blocks), patches.waits()), ((false, 0), true));
+        assert!(store(&mut patches, 0, &large, &blocks).0);
+        assert_eq!((store(&mut patches, 1, &large, &blocks), patches.is_pending()), ((false, 0), true));
         patches.begin(&Changes::default(), false, &blocks);
-        assert_eq!((keep(&mut patches, 1, &large, &blocks), patches.waits()), ((true, 2), false));
-        assert!(patches.of(0, &ROOTS).is_some());
+        assert_eq!((store(&mut patches, 1, &large, &blocks), patches.is_pending()), ((true, 2), false));
+        assert!(patches.get(0, &ROOTS).is_some());
     }
 }

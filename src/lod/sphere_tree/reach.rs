@@ -1,30 +1,30 @@
-//! From the error of a diamond to the radius of its sphere.
+//! Converts the error of a diamond to the radius of its sphere.
 //!
-//! Outside its sphere a diamond may stay unsplit wherever the eye looks: all that it covers lies in the ball about its
-//! middle, further from the eye than the radius less the ball's.
+//! Outside its sphere a diamond may stay unsplit for any direction of the view. All that it covers lies in the ball
+//! about its middle, so its distance from the eye exceeds the radius minus the ball's.
 
 use glam::DVec3;
 
-use super::measure::Known;
+use super::measure::DiamondInfo;
 use crate::view::{Lens, Metric, View};
 
-/// How far errors reach in the views of one lens, picture and tolerance.
+/// Distances at which errors are tolerated, for one lens, image size and tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
-    /// Distance, metres, at which an error of a metre is tolerated.
+    /// Distance, metres, at which an error of one metre is tolerated.
     per_error: f64,
-    /// Errors up to this, metres, are tolerated everywhere.
+    /// Error, metres, that is tolerated at any distance.
     harmless: f64,
 }
 
 impl Reach {
-    /// The reach of a view, whatever its direction.
+    /// Computes the reach of a view; it does not depend on the view's direction.
     ///
-    /// Certified: with [`Allowance::error`](crate::view::Allowance::error)'s terms, all that can be seen at a distance d
-    /// lies at a depth of at least max(near, d/k), no further aside than k times its depth, so that an error up to
-    /// τ·depth / (f·k + τ) moves it by τ pixels at most. The distance is thus k·(f·k + τ)/τ times the error.
-    /// The paper's metric: f/τ times the error. In parallel projection an error is tolerated everywhere or nowhere; under an
-    /// infinite tolerance everywhere.
+    /// Certified metric, with the terms of [`Allowance::error`](crate::view::Allowance::error): a visible point at
+    /// distance d has a depth of at least max(near, d/k), and is at most k times its depth off the axis. An error up to
+    /// τ·depth / (f·k + τ) moves it by at most τ pixels. The distance is therefore k·(f·k + τ)/τ times the error. The
+    /// paper's metric uses f/τ times the error. In parallel projection an error is tolerated everywhere or nowhere;
+    /// under an infinite tolerance, everywhere.
     pub fn new(view: &View) -> Self {
         let (focal, px) = (view.focal_px(), view.tolerance.px);
         if px == f64::INFINITY {
@@ -46,8 +46,9 @@ impl Reach {
         }
     }
 
-    /// The part of a view's tolerance, pixels, that single precision takes of heights relative to the eye's: an error of
-    /// `rounding` times the distance, in parallel projection of times `range_m`, the land's range of heights.
+    /// Returns the part of a view's tolerance, pixels, that heights in single precision relative to the eye use up. The
+    /// error is `rounding` times the distance, or times `range_m`, the terrain's height range in metres, in parallel
+    /// projection.
     pub fn rounding_px(view: &View, rounding: f64, range_m: f64) -> f64 {
         match view.lens {
             Lens::Perspective { .. } => view.focal_px() * view.corner_ray().powi(2) * rounding,
@@ -55,44 +56,45 @@ impl Reach {
         }
     }
 
-    /// Returns true if a diamond of this error has a sphere. If it has none, its children have none. An infinite error always has.
+    /// Returns true if a diamond of this error has a sphere; an infinite error always has one. Without one, its
+    /// children have none.
     #[inline]
-    pub fn matters(&self, error: f32) -> bool {
+    pub fn has_sphere(&self, error: f32) -> bool {
         f64::from(error) > self.harmless.max(0.0) || error == f32::INFINITY
     }
 
-    /// The radius of a diamond's sphere, metres; negative if it has none, infinite if its error is.
+    /// Returns the radius of a diamond's sphere, metres; negative if it has none, infinite if its error is.
     #[inline]
-    pub fn radius(&self, known: &Known) -> f64 {
-        if known.error == f32::INFINITY {
+    pub fn radius(&self, diamond: &DiamondInfo) -> f64 {
+        if diamond.error == f32::INFINITY {
             return f64::INFINITY;
         }
-        if !self.matters(known.error) {
+        if !self.has_sphere(diamond.error) {
             return -1.0;
         }
-        f64::from(known.ball) + f64::from(known.error) * self.per_error
+        f64::from(diamond.ball) + f64::from(diamond.error) * self.per_error
     }
 }
 
-/// Where the eye is, and how far it must be from a diamond's middle.
+/// Position of the eye, and the parameters of all spheres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// From the field's first sample on, metres.
+    /// Eye relative to the field's first sample, metres.
     pub eye: DVec3,
-    /// How far errors reach.
+    /// Distances at which errors are tolerated.
     pub reach: Reach,
-    /// Diamonds split this many times their radius away: 1, or what vertices need to fade in.
+    /// Multiple of the radius at which diamonds split: 1, or more if vertices fade in.
     pub band: f64,
-    /// Diamonds that have split stay so up to this many times that distance.
+    /// Multiple of that distance at which split diamonds merge.
     pub hold: f64,
 }
 
 impl Viewpoint {
-    /// How far the eye may move before a diamond splits, or merges if it has split, metres; not above 0 if it should
-    /// have, infinite if it never does.
+    /// Returns the distance that the eye may move before a diamond splits, or merges if it has split, metres. Not above
+    /// 0 if the change is due, infinite if it never happens.
     #[inline]
-    pub fn slack(&self, known: &Known, is_split: bool) -> f64 {
-        let radius = self.radius(known, is_split);
+    pub fn slack(&self, diamond: &DiamondInfo, is_split: bool) -> f64 {
+        let radius = self.radius(diamond, is_split);
         match is_split {
             _ if radius == f64::INFINITY => {
                 if is_split {
@@ -101,25 +103,26 @@ impl Viewpoint {
                     -radius
                 }
             }
-            true => radius - known.centre.distance(self.eye),
+            true => radius - diamond.centre.distance(self.eye),
             false if radius < 0.0 => f64::INFINITY,
-            // On a sphere is outside.
-            false => (known.centre.distance(self.eye) - radius).next_up(),
+            // A point on the sphere counts as outside.
+            false => (diamond.centre.distance(self.eye) - radius).next_up(),
         }
     }
 
-    /// The radius of the sphere in which a diamond splits, or outside of which it merges if it has split, metres.
+    /// Returns the radius of the sphere in which a diamond splits, or outside of which it merges if it has split,
+    /// metres.
     #[inline]
-    pub fn radius(&self, known: &Known, is_split: bool) -> f64 {
-        self.reach.radius(known) * self.band * if is_split { self.hold } else { 1.0 }
+    pub fn radius(&self, diamond: &DiamondInfo, is_split: bool) -> f64 {
+        self.reach.radius(diamond) * self.band * if is_split { self.hold } else { 1.0 }
     }
 
-    /// How far a vertex still has to go from where its diamond's hypotenuse was, 1 to 0.
+    /// Returns the weight of a vertex, from 1 at its hypotenuse's middle to 0 fully faded in.
     #[inline]
-    pub fn weight(&self, known: &Known) -> f64 {
-        let radius = self.reach.radius(known);
+    pub fn weight(&self, diamond: &DiamondInfo) -> f64 {
+        let radius = self.reach.radius(diamond);
         if radius.is_finite() && self.band > 1.0 {
-            ((known.centre.distance(self.eye) / radius.max(f64::MIN_POSITIVE) - 1.0) / (self.band - 1.0))
+            ((diamond.centre.distance(self.eye) / radius.max(f64::MIN_POSITIVE) - 1.0) / (self.band - 1.0))
                 .clamp(0.0, 1.0)
         } else {
             0.0

@@ -1,9 +1,9 @@
-//! Two priority queues, of splits and of merges, whose priorities wait until the viewpoint can have come near enough.
+//! Tracks the front by two priority queues, of splits and of merges, ordered by the earliest possible crossing.
 //!
-//! After M. Duchaineau et al., "ROAMing Terrain: Real-time Optimally Adapting Meshes" (1997), §6: a priority is worked
-//! out again only when, at the largest speed of the viewpoint, it may have reached the threshold. Here the slack of a
-//! diamond is a distance, and waits for the way that the viewpoint has gone, or could have gone at that speed. The
-//! queue knows nothing of where it went: a diamond that it moves away from is looked at as often as one that it nears.
+//! Based on M. Duchaineau et al., "ROAMing Terrain: Real-time Optimally Adapting Meshes" (1997), §6: a priority is
+//! recomputed only when it may have reached the threshold, given the viewpoint's maximum speed. Here a diamond's slack
+//! is a distance. It is due when the viewpoint has travelled that distance, or could have at the maximum speed. The
+//! queue ignores directions: a diamond that recedes is checked as often as one that approaches.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,42 +11,42 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::front::{CrossingTracker, Front, TrackingHandle};
-use super::measure::Known;
+use super::measure::DiamondInfo;
 use super::reach::Viewpoint;
 
-/// The queues.
+/// Priority queues of splits and merges.
 #[derive(Default)]
 pub struct Queues {
-    /// Way of the viewpoint, metres, upon which members are due, as the bits of a positive float: of those that may
-    /// split, and of those that may merge.
+    /// Travelled distance, metres, at which diamonds are due, as the bits of a positive float; of those that may split,
+    /// and of those that may merge.
     queues: [BinaryHeap<Reverse<(u64, TrackingHandle)>>; 2],
-    /// Way of the viewpoint so far, metres.
-    way: f64,
+    /// Distance that the viewpoint has travelled so far, metres.
+    travelled: f64,
     eye: Option<DVec3>,
-    /// The largest speed, metres a frame: with 0, the way that it really went.
+    /// Maximum speed, metres a frame; 0 to use the actual distance.
     pub largest_speed: f64,
 }
 
 impl CrossingTracker for Queues {
     fn clear(&mut self) {
         self.queues.iter_mut().for_each(BinaryHeap::clear);
-        (self.way, self.eye) = (0.0, None);
+        (self.travelled, self.eye) = (0.0, None);
     }
 
     fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, _visited: &mut usize) {
         if let Some(eye) = self.eye {
-            self.way += eye.distance(from.eye).max(self.largest_speed) * (1.0 + 1e-9);
+            self.travelled += eye.distance(from.eye).max(self.largest_speed) * (1.0 + 1e-9);
         }
         self.eye = Some(from.eye);
         for queue in &mut self.queues {
-            while queue.peek().is_some_and(|Reverse((way, _))| f64::from_bits(*way) <= self.way) {
+            while queue.peek().is_some_and(|Reverse((travelled, _))| f64::from_bits(*travelled) <= self.travelled) {
                 handles.extend(queue.pop().map(|Reverse((_, handle))| handle));
             }
         }
     }
 
-    fn place(&mut self, front: &mut Front, handle: TrackingHandle, _known: &Known, is_split: bool, slack: f64) {
+    fn place(&mut self, front: &mut Front, handle: TrackingHandle, _known: &DiamondInfo, is_split: bool, slack: f64) {
         self.eye = Some(front.from.eye);
-        self.queues[usize::from(is_split)].push(Reverse(((self.way + slack).to_bits(), handle)));
+        self.queues[usize::from(is_split)].push(Reverse(((self.travelled + slack).to_bits(), handle)));
     }
 }

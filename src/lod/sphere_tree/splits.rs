@@ -1,11 +1,11 @@
-//! The diamonds that have split, and the plain way to find them: look at every one again.
+//! The set of split diamonds, and its computation by checking every diamond.
 
 use super::front::ByIndex;
 use super::lattice::Place;
 use super::measure::Measured;
 use super::reach::Viewpoint;
 
-/// A set of split diamonds: none without its parents.
+/// A set of split diamonds; the parents of each are in it too.
 #[derive(Clone, Debug, Default)]
 pub struct Splits {
     words: Words,
@@ -13,21 +13,21 @@ pub struct Splits {
     changes: Changes,
 }
 
-/// What has split or merged since it was last asked for.
+/// Diamonds that split or merged since the last query.
 #[derive(Clone, Debug, Default)]
 pub struct Changes {
-    /// Maybe all, and not only what follows.
+    /// True if any diamond may have changed, not only `middles`.
     pub all: bool,
     /// Middles of diamonds.
     pub middles: Vec<Place>,
 }
 
-/// One bit a diamond, by index.
+/// Bit set of diamonds by index.
 #[derive(Clone, Debug)]
 enum Words {
-    /// Of all diamonds.
+    /// Words of all diamonds.
     All(Vec<u64>),
-    /// Of a tree too deep for that: those that are not 0.
+    /// Nonzero words only, for a tree too deep to store all.
     Some(ByIndex<u64>),
 }
 
@@ -69,19 +69,19 @@ impl Words {
     }
 }
 
-/// What a pass over all diamonds found.
+/// Result of a pass over all diamonds.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
-    /// The diamonds that have split: middles and indices, parents first.
+    /// Split diamonds with their indices, parents first.
     pub split: Vec<(Place, usize)>,
-    /// Diamonds looked at.
+    /// Number of diamonds checked.
     pub visited: usize,
-    /// The set before.
+    /// Previous set.
     before: Splits,
 }
 
 impl Splits {
-    /// No split diamond.
+    /// Creates an empty set.
     pub fn none(measured: &Measured) -> Self {
         Self { words: Words::none(measured), count: 0, changes: Changes::default() }
     }
@@ -100,56 +100,56 @@ impl Splits {
         self.changes.all = true;
     }
 
-    /// What has split or merged since the last call.
+    /// Returns the diamonds that split or merged since the last call.
     pub fn changes(&mut self) -> Changes {
         std::mem::take(&mut self.changes)
     }
 
-    /// Whether a diamond has split, by index.
+    /// Returns true if the diamond with this index has split.
     #[inline]
     pub fn contains(&self, index: usize) -> bool {
         self.words.get(index / 64) >> (index % 64) & 1 != 0
     }
 
-    /// How many have.
+    /// Returns the number of split diamonds.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Adds one that has not.
+    /// Adds a diamond that has not split.
     pub(super) fn insert(&mut self, at: Place, index: usize) {
         debug_assert!(!self.contains(index));
-        self.note(at);
+        self.record(at);
         self.words.flip(index / 64, 1 << (index % 64));
         self.count += 1;
     }
 
-    /// Removes one.
+    /// Removes a split diamond.
     pub(super) fn remove(&mut self, at: Place, index: usize) {
         debug_assert!(self.contains(index));
-        self.note(at);
+        self.record(at);
         self.words.flip(index / 64, 1 << (index % 64));
         self.count -= 1;
     }
 
-    fn note(&mut self, at: Place) {
+    fn record(&mut self, at: Place) {
         if !self.changes.all {
             self.changes.middles.push(at);
         }
     }
 
-    /// Whether all parents of a diamond have split.
+    /// Returns true if all parents of a diamond have split.
     pub fn is_ready(&self, measured: &Measured, at: Place) -> bool {
         measured.lattice.parents(at).all(|(_, parent)| self.contains(parent))
     }
 
-    /// Whether a child of a diamond has split.
+    /// Returns true if a child of a diamond has split.
     pub fn is_needed(&self, measured: &Measured, at: Place) -> bool {
         measured.lattice.children(at).any(|(_, child)| self.contains(child))
     }
 
-    /// Looks at every diamond that could have split, from the root on, and makes this the set for the viewpoint.
-    /// It gives up, and says so, beyond `max` diamonds.
+    /// Computes the set for a viewpoint by checking, from the root, every diamond that could have split. Returns false
+    /// if more than `max` diamonds would split.
     pub fn refill(&mut self, measured: &Measured, from: &Viewpoint, found: &mut Found, max: usize) -> bool {
         std::mem::swap(self, &mut found.before);
         self.clear(measured);
@@ -158,13 +158,13 @@ impl Splits {
         let mut open: Vec<_> =
             measured.lattice.root().and_then(|at| Some((at, measured.lattice.index(at)?))).into_iter().collect();
         while !open.is_empty() {
-            // Level by level, so that what is not known yet is worked out side by side.
-            measured.look_ahead(&open);
+            // Level by level, so that sizes not cached yet are computed in parallel.
+            measured.precompute(&open);
             for (at, index) in std::mem::take(&mut open) {
                 found.visited += 1;
-                let known = measured.known(at, index);
+                let diamond = measured.diamond(at, index);
                 let was_split = from.hold > 1.0 && found.before.contains(index);
-                let slack = from.slack(&known, was_split);
+                let slack = from.slack(&diamond, was_split);
                 if (slack > 0.0) != was_split {
                     continue;
                 }
@@ -173,10 +173,11 @@ impl Splits {
                 }
                 self.insert(at, index);
                 found.split.push((at, index));
-                // The last of its parents to split opens a diamond.
+                // A diamond becomes ready when the last of its parents splits.
                 let children = measured.lattice.children(at);
                 open.extend(
-                    children.filter(|&(at, child)| measured.matters(&from.reach, child) && self.is_ready(measured, at)),
+                    children
+                        .filter(|&(at, child)| measured.has_sphere(&from.reach, child) && self.is_ready(measured, at)),
                 );
             }
         }
