@@ -244,7 +244,7 @@ impl ReadArgs {
         } else {
             load_all(&terrain.iter().map(Path::new).collect::<Vec<_>>(), &options)?
         };
-        loaded.field.source = (!self.no_cache && !is_demo).then(|| several::cache_path(terrain).into());
+        loaded.field.file = (!self.no_cache && !is_demo).then(|| several::cache_path(terrain).into());
         for warning in &loaded.warnings {
             report::warn(common, warning);
         }

@@ -1,10 +1,10 @@
-//! What is known of the squares of a quadtree over a field before any view: the range of their heights, and how
-//! far their surface is from the samples.
+//! Bounds of a quadtree over a field, measured before any view: the height range of each square, and the distance of its
+//! surface from the samples.
 //!
-//! A square of level ℓ is `cells` × `cells` cells with vertices on every 2^ℓ-th sample. Only the stored samples of a
-//! tiled field are looked at, however often it repeats. Where its period is a multiple of a square's side, or the
-//! other way round, all squares that look the same are measured once. Otherwise the vertices of a square may lie
-//! anywhere, and [`levels::detail`] bounds its error: greater, but true for all.
+//! A square of level ℓ is `cells` × `cells` cells with vertices on every 2^ℓ-th sample. A tiled field is measured on its
+//! stored samples only. If its period is a multiple of a square's side, or the other way round, equal squares are
+//! measured once. Otherwise the vertices of a square may lie on any samples, and [`levels::detail`] bounds its error for
+//! all of them, less tightly.
 
 use rayon::prelude::*;
 
@@ -13,27 +13,29 @@ use super::levels::{self, Patch};
 use super::progress::Progress;
 use super::{Field, cuts, surface};
 
-/// Heights between two shapes are rounded: by at most 12 half-ulps of the largest height around, six for each of
-/// the two steps of `draw::place::lattice_height`.
+/// Largest rounding error of a morphed height, relative to the largest height around it.
+///
+/// It is at most 12 half-ulps: six for each of the two steps of `draw::place::lattice_height`.
 pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// Fields with fewer stored samples are measured in a moment: nothing is kept.
+/// Stored samples from which on bounds are cached on disk; smaller fields are measured in a moment.
 pub(crate) const KEPT_FROM: u64 = 1 << 23;
 
-/// Tiled fields with holes are measured whole up to this many samples: only so it is known of each square whether it has
-/// land, where their end cuts a period or a period is cut into squares.
+/// Samples up to which a tiled field with holes is measured whole.
+///
+/// Only a whole measurement tells which squares have terrain where the field's end or a square's edge cuts a period.
 const WHOLE_UP_TO: u64 = 1 << 22;
 
-/// What is to be measured.
+/// Choice of squares and of the quantities measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Measure {
     /// Cells along a side of a square at every level: a power of two, at least 8.
     pub cells: u32,
-    /// A square's error is at least this many times those of the squares in it (1: saturated).
+    /// Smallest ratio of a square's error to those of the squares in it (1: saturated).
     pub growth: f32,
-    /// Whether errors are measured at all: otherwise they are 0.
+    /// True if errors are measured; otherwise they are 0.
     pub errors: bool,
-    /// Whether the squares in it go over into a square gradually: then that must be within its error too.
+    /// True if children morph into their parent: the parent's error then bounds all stages of the morph.
     pub morph: bool,
 }
 
@@ -41,12 +43,13 @@ pub struct Measure {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Square {
-    /// The largest distance, metres, of its surface from the samples, holes excepted, and at least that of the squares
-    /// in it. In [`Bounds`]: with any of its sides one level coarser too, and at least `growth` times that of the squares
-    /// in it; 0 at level 0, where only a coarser side is off the samples, and that is within the error of the square
-    /// beyond it.
+    /// Largest vertical distance of its surface from the samples, metres, holes excepted.
+    ///
+    /// At least that of the squares in it. In [`Bounds`] it holds with any side one level coarser too, and is at least
+    /// `growth` times that of the squares in it. At level 0 it is 0: only a coarser side is off the samples, and the
+    /// square beyond that side accounts for it.
     pub error: f32,
-    /// Lowest and highest sample, metres; the lowest is above the highest if there is no land.
+    /// Lowest and highest sample, metres; the lowest is above the highest if there is no terrain.
     pub range: [f32; 2],
 }
 
@@ -56,11 +59,11 @@ pub struct Bounds {
     last: [u32; 2],
     period: [Option<u32>; 2],
     levels: Vec<BoundsLevel>,
-    /// By level, the error of cells that the end of a tiled field cuts; none where errors are not measured.
+    /// By level, the error of the cells that the end of a tiled field cuts; 0 where errors are not measured.
     cuts: Vec<f32>,
 }
 
-/// The squares of one level: those of a tiled axis begin at every multiple of the side within the period.
+/// The squares of one level. Along a tiled axis they begin at every multiple of the side within the period.
 struct BoundsLevel {
     side: u32,
     count: [u32; 2],
@@ -68,7 +71,7 @@ struct BoundsLevel {
 }
 
 impl Measure {
-    /// A name for what is measured, in file names.
+    /// Returns a name for the choice, for file names.
     fn name(&self) -> String {
         let Self { cells, growth, errors, morph } = self;
         let what = if *errors { "errors" } else { "ranges" };
@@ -77,16 +80,16 @@ impl Measure {
 }
 
 impl Square {
-    /// Of nothing.
+    /// A square without terrain.
     pub(crate) const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
 
-    /// Whether there is any land; in [`Bounds`]: whether any triangle of the samples' own surface has data.
+    /// Returns true if there is any terrain. In [`Bounds`]: if any triangle of the finest surface has data.
     #[inline]
     pub fn has_terrain(&self) -> bool {
         self.range[0] <= self.range[1]
     }
 
-    /// Of two squares together.
+    /// Returns the bounds of two squares together.
     pub(crate) fn union(self, other: Square) -> Square {
         let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
         Square { error: self.error.max(other.error), range }
@@ -94,7 +97,7 @@ impl Square {
 }
 
 impl Bounds {
-    /// Measures a field, in parallel, or finds what was kept when it was measured before.
+    /// Measures a field in parallel, or reads the bounds from the disk cache.
     pub fn new(field: &Field, measure: Measure, progress: &Progress) -> Self {
         let (stored, size) = (field.stored(), field.size());
         let samples = |size: [u32; 2]| size.iter().map(|&n| u64::from(n)).product::<u64>();
@@ -108,7 +111,7 @@ impl Bounds {
         if cache.as_ref().and_then(DiskCache::read).is_some_and(|content| bounds.fill(&content)) {
             return bounds;
         }
-        // A level takes about as long as another: all its squares look at all samples.
+        // Each level reads all samples, so all levels take about as long.
         progress.expect(bounds.levels.iter().map(|level| level.samples()).sum());
         (0..bounds.levels()).for_each(|level| bounds.measure_level(field, level, progress));
         if measure.errors && period != [None; 2] {
@@ -119,7 +122,7 @@ impl Bounds {
         bounds
     }
 
-    /// Makes the levels, unmeasured, up to the one whose square is as long as the field.
+    /// Allocates the levels, up to the one whose square covers the longer side of the field.
     fn lay_out(&mut self, longest: u32) {
         loop {
             let side = self.side(self.levels());
@@ -132,13 +135,13 @@ impl Bounds {
         }
     }
 
-    /// All squares, level by level, and what is cut.
+    /// Returns all squares, level by level, and then the errors of cut cells, as bytes.
     fn content(&self) -> Vec<u8> {
         let squares = self.levels.iter().flat_map(|level| bytemuck::cast_slice::<_, u8>(&level.squares));
         squares.chain(bytemuck::cast_slice(&self.cuts)).copied().collect()
     }
 
-    /// Takes all from what [`Self::content`] made; `false` if that was another layout.
+    /// Restores the bytes of [`Self::content`]; returns false if their number does not fit this layout.
     fn fill(&mut self, content: &[u8]) -> bool {
         if content.len() != self.bytes() + size_of_val(self.cuts.as_slice()) {
             return false;
@@ -153,48 +156,49 @@ impl Bounds {
         true
     }
 
-    /// How many levels there are; one square of the last holds the field.
+    /// Returns the number of levels; one square of the last covers the field.
     #[inline]
     pub fn levels(&self) -> u32 {
         self.levels.len() as u32
     }
 
-    /// The squares held of a level: how many (x, z), and all row by row. Those of a tiled axis begin at every
-    /// multiple of the side within the period.
+    /// Returns the measured squares of a level: their number (x, z), and all of them row by row. Along a tiled axis
+    /// they begin at every multiple of the side within the period.
     pub fn held(&self, level: u32) -> ([u32; 2], &[Square]) {
         let level = &self.levels[level as usize];
         (level.count, &level.squares)
     }
 
-    /// After how many samples (x, z) the field repeats, if it does.
+    /// Returns the period of the field along (x, z), samples; `None` along an axis that is measured whole.
     pub fn period(&self) -> [Option<u32>; 2] {
         self.period
     }
 
-    /// The error, metres, of the cells of a level that the end of a tiled field cuts, at most what samples in them are
-    /// apart: that alone counts where it is infinite.
+    /// Returns the error, metres, of the cells of a level that the end of a tiled field cuts.
+    ///
+    /// It is infinite where no bound was found. The height range of a cell bounds its error as well.
     pub fn cut(&self, level: u32) -> f32 {
         self.cuts[level as usize]
     }
 
-    /// Bytes held.
+    /// Returns the size of all squares in bytes.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(level.squares.as_slice())).sum()
     }
 
-    /// Samples along a side of the squares of a level.
+    /// Returns the samples along a side of a square of a level.
     #[inline]
     pub fn side(&self, level: u32) -> u32 {
         self.measure.cells << level
     }
 
-    /// Whether a square sticks out of the field.
+    /// Returns true if a square extends beyond the field.
     pub fn is_partial(&self, level: u32, at: [u32; 2]) -> bool {
         let side = self.side(level);
         (at[0] + 1) * side > self.last[0] || (at[1] + 1) * side > self.last[1]
     }
 
-    /// The square at a place among those of its level.
+    /// Returns the square at a position among those of its level.
     #[inline]
     pub fn square(&self, level: u32, at: [u32; 2]) -> Square {
         if let [None, None] = self.period {
@@ -204,7 +208,7 @@ impl Bounds {
         self.tiled_square(level, at)
     }
 
-    /// The four squares in a square of the level above: those beyond the field have no land.
+    /// Returns the four squares in a square of the level above; those beyond the field have no terrain.
     #[inline]
     pub fn squares(&self, level: u32, [i, j]: [u32; 2]) -> [Square; 4] {
         let (side, last) = (self.side(level), self.last);
@@ -227,7 +231,7 @@ impl Bounds {
         Square { error: square.error.max(self.cut(level).min(high - low)), ..square }
     }
 
-    /// What holds for all squares of a level that a rectangle of samples touches.
+    /// Returns common bounds of all squares of a level that a rectangle of samples touches.
     pub fn covering(&self, level: u32, first: [u32; 2], side: [u32; 2]) -> Square {
         let held = &self.levels[level as usize];
         let [(x, x_count), (z, z_count)] = [0, 1].map(|k| held.touched(k, self.period[k], first[k], side[k]));
@@ -253,7 +257,7 @@ impl Bounds {
 
     fn measured(&self, field: &Field, level: u32, first: [u32; 2]) -> Square {
         let side = self.side(level);
-        // No further than once around, or to the end.
+        // At most one period, or up to the end.
         let reach = [0, 1].map(|k| self.period[k].map_or((self.last[k] - first[k]).min(side), |n| n.min(side)));
         let children = match level {
             0 => Square { error: 0.0, range: range_of_terrain(field, first, reach) },
@@ -269,7 +273,7 @@ impl Bounds {
         } else if aligned {
             self.error(field, level, first)
         } else {
-            // Level 1 is the first to add to the samples; the next one, on the sides.
+            // Level 1 is the first that differs from the samples. The sides may be of the next level.
             let levels = if level == 1 { 1..=2 } else { level + 1..=level + 1 };
             children.error + levels.map(|level| levels::detail(field, first, reach, level)).sum::<f32>()
         };
@@ -277,26 +281,26 @@ impl Bounds {
         Square { error: (own + rounding).max(children.error * self.measure.growth), range: children.range }
     }
 
-    /// The error of a square whose vertices' places are known.
+    /// Returns the error of a square whose vertices lie on known samples, metres.
     fn error(&self, field: &Field, level: u32, first: [u32; 2]) -> f32 {
         let last = [0, 1].map(|k| if self.period[k].is_some() { u32::MAX } else { self.last[k] });
-        // What sticks out of the field collapses; what repeats is looked at once.
+        // Cells beyond the field collapse; one period stands for all.
         let length = self.period.map(|period| period.unwrap_or(u32::MAX).min(self.side(level)));
         let patch = |level: u32| Patch { field, first, cells: length.map(|n| n >> level), level, last };
         let own = patch(level).deviation();
-        // Squares in it that go over into it have sides two levels coarser than themselves.
+        // Children that morph into the square have sides two levels coarser than themselves.
         let way = if self.measure.morph { patch(level - 1).stitched_deviation(2) } else { 0.0 };
         own.max(way).max(patch(level).stitched_deviation(1))
     }
 }
 
 impl BoundsLevel {
-    /// Samples that its squares look at.
+    /// Returns the number of samples that measuring its squares reads.
     fn samples(&self) -> u64 {
         [self.count[0], self.count[1], self.side, self.side].map(u64::from).iter().product()
     }
 
-    /// Which squares along an axis a length of samples touches: the first and how many, modulo their count.
+    /// Returns the squares along an axis that a length of samples touches: the first and the number, modulo their count.
     fn touched(&self, axis: usize, period: Option<u32>, first: u32, length: u32) -> (u32, u32) {
         let (side, count) = (self.side, self.count[axis]);
         let Some(period) = period else {
@@ -314,7 +318,7 @@ impl BoundsLevel {
     }
 }
 
-/// Whether the squares of a level lie on a tiled axis of this period so that each looks like one of the first.
+/// Returns true if each square of a level equals one in the first period along a tiled axis.
 pub fn is_aligned(period: u32, level: u32, side: u32) -> bool {
     period.is_multiple_of(side) || side.is_multiple_of(period) && period.is_multiple_of(4 << level)
 }
@@ -324,8 +328,7 @@ fn range_of_terrain(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2]
     if !surface::has_terrain(field, first.map(|n| n as i32), last.map(|n| n as i32)) {
         return Square::NOTHING.range;
     }
-    let heights = (first[1]..=last[1]).flat_map(|j| (first[0]..=last[0]).map(move |i| field.height(i, j)));
-    heights.fold(Square::NOTHING.range, |[low, high], y| [low.min(y), high.max(y)])
+    field.range_of(first, last)
 }
 
 #[cfg(test)]
@@ -350,7 +353,7 @@ mod tests {
         Field::new(Samples::F32(heights.collect()), size, [1.0; 2], Holes::none(count))
     }
 
-    /// The same land with every sample of every tile held.
+    /// Returns the same terrain with every sample of every tile in memory.
     fn held(field: &Field) -> Field {
         let [w, h] = field.size();
         let heights = (0..w * h).map(|k| field.height(k % w, k / w)).collect();
@@ -408,7 +411,7 @@ mod tests {
         }
     }
 
-    /// The error of the four squares in a square the slow way, while its sides are already two levels coarser.
+    /// Returns the error of the four children the slow way, with sides two levels coarser.
     fn slow_way(field: &Field, level: u32, at: [u32; 2]) -> f32 {
         let last = field.size().map(|n| n as i32 - 1);
         let sample = |[i, j]: [i32; 2]| {
@@ -434,7 +437,7 @@ mod tests {
 
     #[test]
     fn while_squares_go_over_into_theirs_the_error_holds_too() {
-        // Beside the first side: both ends of the way are within 1.1 m of these, but 1.3 m lie between them.
+        // Beside the first side: both ends of the morph are within 1.1 m of these, but 1.3 m lie between them.
         let ridge = [-1.0, -1.2, 0.2, -0.5, -0.8, -0.6, -0.4, -0.2];
         let height = |k: usize| if k % 65 == 4 { ridge.get(k / 65).copied().unwrap_or(0.0) } else { 0.0 };
         let field = Field::new(Samples::F32((0..65 * 65).map(height).collect()), [65, 65], [1.0; 2], Holes::none(0));

@@ -1,17 +1,18 @@
-//! A cave: a floor and a ceiling over the same samples, which meet where there is rock between them.
+//! Caves: a floor and a ceiling over the same samples, which meet at rock.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Error, Field, Holes, Samples};
+use super::source::{Block, Coverage, HeightSource};
+use super::{Error, Field, Holes, Raster, Samples};
 
 /// Floor and ceiling of a cave, welded: at samples of rock both have the same height.
 ///
-/// A sample is rock where the ceiling is not above the floor, or where one of the two has no data. Rock beside the cave
-/// lies half-way between what floor and ceiling were there, where surfaces through their samples would about meet, and
-/// rock further in goes on smoothly from there. A triangle whose corners are all rock thus is in both surfaces, with
-/// nothing between them: drawn by neither, it leaves them with one common edge.
+/// A sample is rock if the ceiling is not above the floor, or if one of the two has no data. Rock beside the cave lies
+/// half-way between floor and ceiling, about where surfaces through their samples would meet. Rock further in continues
+/// smoothly from there. A triangle with three rock corners is the same in both surfaces. It is drawn by neither, so that
+/// floor and ceiling end in one common edge.
 #[derive(Clone, Debug)]
 pub struct Cave {
     floor: Arc<Field>,
@@ -19,15 +20,15 @@ pub struct Cave {
 }
 
 impl Cave {
-    /// Welds two fields. `file` names the ceiling's in errors.
+    /// Welds two fields. `file` is the name of the ceiling's file in errors.
     ///
     /// # Errors
-    /// If the ceiling has not the floor's size, tiles, spacing and origin.
+    /// If the ceiling differs from the floor in size, tiling, spacing or origin.
     pub fn new(floor: &Field, ceiling: &Field, file: &str) -> Result<Self, Error> {
         let differs = |place: &str, expected: String, found: String| {
             Error::new(file, place, format!("expected the floor's {expected}, found {found}"))
         };
-        if (floor.stored, floor.tiles) != (ceiling.stored, ceiling.tiles) {
+        if (floor.stored(), floor.size()) != (ceiling.stored(), ceiling.size()) {
             let [expected, found] =
                 [floor, ceiling].map(|field| field.size()).map(|[w, h]| format!("{w} × {h} samples"));
             return Err(differs("size", expected, found));
@@ -43,47 +44,99 @@ impl Cave {
     }
 
     fn welded(floor: &Field, ceiling: &Field) -> Self {
-        let heights = |field: &Field| (0..field.samples.len()).map(|k| field.samples.height(k)).collect::<Vec<_>>();
+        let heights = |field: &Field| (0..field.samples().len()).map(|k| field.samples().height(k)).collect::<Vec<_>>();
         let [low, high] = [floor, ceiling].map(heights);
-        let no_data = |k: usize| floor.holes.contains(k) || ceiling.holes.contains(k);
+        let no_data = |k: usize| floor.holes().contains(k) || ceiling.holes().contains(k);
         let is_rock: Vec<bool> = (0..low.len()).map(|k| high[k] <= low[k] || no_data(k)).collect();
         let between = meeting(floor, &low, &high, &is_rock);
-        let welded = |heights: Vec<f32>, ceiling: Option<Arc<Field>>| {
-            let height = |k: usize| if is_rock[k] { between.samples.height(k) } else { heights[k] };
+        let welded = |heights: Vec<f32>| {
+            let height = |k: usize| if is_rock[k] { between.samples().height(k) } else { heights[k] };
             let samples = Samples::F32((0..heights.len()).map(height).collect());
-            let holes = Holes::none(heights.len());
-            Arc::new(Field { samples, holes, source: None, ceiling, ..floor.clone() })
+            floor.source().with_raster(Raster::new(samples, floor.stored(), Holes::none(heights.len())))
         };
-        let ceiling = welded(high, None);
-        Self { floor: welded(low, Some(Arc::clone(&ceiling))), ceiling }
+        let ceiling = Arc::new(floor.with_source(welded(high)));
+        let source = CaveFloor { floor: welded(low), ceiling: Arc::clone(&ceiling) };
+        Self { floor: Arc::new(floor.with_source(Arc::new(source))), ceiling }
     }
 
-    /// The cave that a field is the floor of.
+    /// Returns the cave that a field is the floor of.
     pub fn of(floor: &Arc<Field>) -> Option<Self> {
         let ceiling = Arc::clone(floor.ceiling()?);
         Some(Self { floor: Arc::clone(floor), ceiling })
     }
 
-    /// The floor, which knows its ceiling: it stands for the cave wherever a field is asked for.
+    /// Returns the floor. Its source holds the ceiling, so that it stands for the cave wherever a field is needed.
     pub fn floor(&self) -> &Arc<Field> {
         &self.floor
     }
 
-    /// The ceiling, nowhere below the floor.
+    /// Returns the ceiling, nowhere below the floor.
     pub fn ceiling(&self) -> &Arc<Field> {
         &self.ceiling
     }
 
-    /// Whether there is nothing between floor and ceiling at a sample.
+    /// Returns true if floor and ceiling meet at a sample.
     #[inline]
     pub fn is_rock(&self, i: u32, j: u32) -> bool {
         self.floor.height(i, j) == self.ceiling.height(i, j)
     }
 }
 
-/// Where floor and ceiling meet: half-way at rock beside the cave, filled in from there elsewhere.
-fn meeting(floor: &Field, low: &[f32], high: &[f32], is_rock: &[bool]) -> Field {
-    let [w, h] = floor.stored.map(|n| n as usize);
+/// The floor of a cave: any source, with a ceiling over it.
+#[derive(Clone, Debug)]
+pub struct CaveFloor {
+    floor: Arc<dyn HeightSource>,
+    ceiling: Arc<Field>,
+}
+
+impl HeightSource for CaveFloor {
+    fn size(&self) -> [u32; 2] {
+        self.floor.size()
+    }
+
+    fn height(&self, i: u32, j: u32) -> f32 {
+        self.floor.height(i, j)
+    }
+
+    fn is_hole(&self, i: u32, j: u32) -> bool {
+        self.floor.is_hole(i, j)
+    }
+
+    fn raster(&self) -> &Raster {
+        self.floor.raster()
+    }
+
+    fn coverage(&self) -> Coverage {
+        self.floor.coverage()
+    }
+
+    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
+        Arc::new(Self { floor: self.floor.with_raster(raster), ceiling: Arc::clone(&self.ceiling) })
+    }
+
+    fn read(&self, block: &Block, heights: &mut Vec<f32>) {
+        self.floor.read(block, heights);
+    }
+
+    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
+        self.floor.range_of(first, last)
+    }
+
+    fn range(&self) -> [f32; 2] {
+        let ([low, high], [over_low, over_high]) = (self.floor.range(), self.ceiling.range());
+        [low.min(over_low), high.max(over_high)]
+    }
+
+    fn ceiling(&self) -> Option<&Arc<Field>> {
+        Some(&self.ceiling)
+    }
+}
+
+/// Returns the surface along which floor and ceiling meet: half-way between them at rock beside the cave, filled in from
+/// there elsewhere.
+fn meeting(floor: &Field, low: &[f32], high: &[f32], is_rock: &[bool]) -> Raster {
+    let size = floor.stored();
+    let [w, h] = size.map(|n| n as usize);
     let around = |n: usize, last: usize| n.saturating_sub(1)..=(n + 1).min(last);
     let is_beside = |k: usize| {
         let mut near = around(k / w, h - 1).flat_map(|j| around(k % w, w - 1).map(move |i| j * w + i));
@@ -93,7 +146,7 @@ fn meeting(floor: &Field, low: &[f32], high: &[f32], is_rock: &[bool]) -> Field 
     let mut holes = Holes::none(low.len());
     (0..low.len()).filter(|&k| !known[k]).for_each(|k| holes.insert(k));
     let half_way = low.iter().zip(high).map(|(low, high)| low * 0.5 + high * 0.5).collect();
-    Field::new(Samples::F32(half_way), floor.stored, floor.spacing, holes)
+    Raster::new(Samples::F32(half_way), size, holes)
 }
 
 #[cfg(test)]

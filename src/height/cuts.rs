@@ -1,13 +1,13 @@
-//! Where a tiled field ends, cells of coarse levels are cut: they are as no other is that repeats.
+//! Errors of the cells that the end of a tiled field cuts. Such cells equal none of the repeating ones.
 
 use super::Field;
 use super::bounds::{Measure, ROUNDING, is_aligned};
 use super::levels::Patch;
 
-/// The largest error, metres, of the cells of each level that the end of a tiled field cuts, as
-/// [`Bounds`](super::bounds::Bounds) have it of squares, from level 0 on; infinite where they may lie anywhere in the
-/// period, or are as long: there it is no more than what their samples are apart.
-/// `highest` is the largest height above or below 0, metres.
+/// Returns the largest error, metres, of the cut cells of each level, from level 0 on.
+///
+/// Errors are those of [`Bounds`](super::bounds::Bounds). They are infinite where cells may lie anywhere in the period,
+/// or are as long as it; their height range then bounds the error. `highest` is the largest absolute height, metres.
 pub fn errors(field: &Field, measure: Measure, levels: u32, highest: f32) -> Vec<f32> {
     let mut errors: Vec<f32> = vec![0.0];
     for level in 1..levels {

@@ -1,11 +1,11 @@
-//! The terrain that comes with the program: alpine land of 25.6 × 25.6 km, made by [`super::synth`].
+//! The embedded terrain: 25.6 × 25.6 km of alpine landscape, made by [`super::synth`].
 //!
-//! `cargo test --release --no-default-features -- --ignored make_assets` makes both files anew, byte for byte.
+//! `cargo test --release --no-default-features -- --ignored make_assets` writes both files again, byte for byte.
 
 use super::synth::Kind;
 use super::{Field, Holes, Samples};
 
-/// What [`demo`] was synthesised as.
+/// Kind of landscape that [`demo`] was synthesised from.
 pub const KIND: Kind = Kind::Eroded;
 /// See [`KIND`].
 pub const SIZE: [u32; 2] = [1025, 1025];
@@ -16,13 +16,13 @@ pub const SCALE: f32 = 0.1;
 /// Distance of samples, metres.
 pub const SPACING: f64 = 25.0;
 
-/// The colours of the land, from the first sample to the last one along each axis, north up: a JPEG picture.
+/// Colours of the terrain, from the first sample to the last one along each axis, north up: a JPEG picture.
 pub const OVERLAY: &[u8] = include_bytes!("../../assets/demo_overlay.jpg");
 
 /// The heights as 16-bit codes: a grey PNG picture.
 pub const PICTURE: &[u8] = include_bytes!("../../assets/demo.png");
 
-/// The field.
+/// Decodes the embedded terrain.
 pub fn demo() -> Field {
     let picture = image::load_from_memory(PICTURE).expect("the embedded picture is whole").into_luma16();
     let size = [picture.width(), picture.height()];

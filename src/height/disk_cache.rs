@@ -1,7 +1,7 @@
-//! What took long to work out of a field, kept beside the file that it was read from.
+//! A cache of derived data in a file beside the one that the heights were read from.
 //!
-//! A kept file says which samples it is about by their hash, and its own content by another: what is stale, cut
-//! short or damaged is worked out again. It is a convenience: where it cannot be written, nothing is kept.
+//! A cache file holds a hash of the samples and one of its own content. Stale, truncated and damaged files are ignored
+//! and replaced. A cache that cannot be written is no error.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -11,25 +11,25 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 use super::save::replace;
 use super::{Field, Samples};
 
-/// First bytes of a kept file; the digit grows when what is kept means something else.
+/// First bytes of a cache file; the digit grows when the content changes its meaning.
 const MAGIC: &[u8; 16] = b"cuesta kept 1\r\n\x1a";
 
-/// Where something worked out of a field is kept, and the state of the field that it was worked out of.
+/// A cache file, and the hash of the samples that its content is derived from.
 pub struct DiskCache {
     path: PathBuf,
     key: u128,
 }
 
 impl DiskCache {
-    /// The place of what `name` says, beside the field's file, if the field has one.
+    /// Returns the cache file called `name` beside the field's file; `None` if the field has no file.
     pub fn new(field: &Field, name: &str) -> Option<Self> {
-        let source = field.source.as_deref()?;
+        let source = field.file.as_deref()?;
         let mut path = source.as_os_str().to_owned();
         path.push(format!(".cuesta-{name}"));
         Some(Self { path: path.into(), key: key(field) })
     }
 
-    /// What was kept of a field like this one.
+    /// Reads the content; `None` if there is none for these samples.
     pub fn read(&self) -> Option<Vec<u8>> {
         let mut bytes = std::fs::read(&self.path).ok()?;
         let head = size_of_val(MAGIC) + 2 * size_of::<u128>();
@@ -37,10 +37,10 @@ impl DiskCache {
         is_whole.then(|| bytes.split_off(head))
     }
 
-    /// Keeps something, if the file can be written.
+    /// Writes the content, if the file can be written.
     pub fn write(&self, content: &[u8]) {
         let head = self.head(content);
-        // Without it the next start takes as long as this one: no loss.
+        // Without the cache the next start takes as long as this one.
         let _ = replace(&self.path, |out| out.write_all(&head).and_then(|()| out.write_all(content)));
     }
 
@@ -49,7 +49,7 @@ impl DiskCache {
     }
 }
 
-/// A hash of a field's heights and of where it has none; not of where it lies.
+/// Returns a hash of a field's heights and holes; position and spacing do not count.
 fn key(field: &Field) -> u128 {
     let mut hash = Xxh3::new();
     hash.update(bytemuck::bytes_of(&field.stored()));
@@ -74,7 +74,7 @@ mod tests {
 
     fn field(source: &Path, heights: [f32; 4]) -> Field {
         let mut field = Field::new(Samples::F32(heights.to_vec()), [2, 2], [1.0; 2], Holes::none(4));
-        field.source = Some(source.into());
+        field.file = Some(source.into());
         field
     }
 
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_short_or_damaged_is_not_read() {
+    fn a_truncated_or_damaged_file_is_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let cache = DiskCache::new(&field(&folder.path().join("a.tif"), [0.0; 4]), "thing").unwrap();
         cache.write(b"what was found");

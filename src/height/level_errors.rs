@@ -1,4 +1,4 @@
-//! What holds for a whole level of a field, wherever a square of it lies: bounds for shapes that know of no square.
+//! Bounds that hold for a whole level of a field, for techniques whose shapes are not squares of the quadtree.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use super::Field;
 use super::bounds::Bounds;
 use super::levels;
 
-/// The largest error, metres, of any square of each level, those that the end of a tiled field cuts included.
+/// Returns the largest error, metres, of any square of each level, cut ones at the end of a tiled field included.
 pub fn largest_errors(bounds: &Bounds) -> Vec<f32> {
     let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
     let of_level = |level: u32| {
@@ -16,8 +16,10 @@ pub fn largest_errors(bounds: &Bounds) -> Vec<f32> {
     (0..bounds.levels()).map(of_level).collect()
 }
 
-/// The largest way, metres, that a vertex goes from the level below into each level: from its sample to the middle of
-/// the edge of the level on which it lies. Vertices whose edge ends beyond the field do not go. 0 of level 0.
+/// Returns the largest distance, metres, by which a vertex moves when the level below morphs into each level.
+///
+/// A vertex moves from its sample to the middle of the coarser edge on which it lies. Vertices whose edge ends beyond
+/// the field stay. The distance is 0 for level 0.
 pub fn largest_displacements(field: &Field, bounds: &Bounds) -> Vec<f32> {
     let of_level = |level: u32| if level == 0 { 0.0 } else { largest_way(field, bounds, level) };
     (0..bounds.levels()).map(of_level).collect()
@@ -33,8 +35,8 @@ fn largest_way(field: &Field, bounds: &Bounds, level: u32) -> f32 {
     (0..count[1]).into_par_iter().map(row).reduce(|| 0.0, f32::max).next_up()
 }
 
-/// How far a vertex of the level with a vertex on every `half`-th sample is from the edge of the next level; `None` if
-/// that level has it, or not the whole edge.
+/// Returns the distance, metres, of a vertex of the level with a vertex on every `half`-th sample from the edge of the
+/// next level; `None` if that level has the vertex, or not the whole edge.
 fn bend(field: &Field, vertex: [u32; 2], half: u32, last: [u32; 2]) -> Option<f32> {
     let [odd_x, odd_z] = vertex.map(|n| n & 1);
     let (dx, mut dz) = (odd_x as i32, odd_z as i32);
@@ -65,7 +67,7 @@ mod tests {
         Bounds::new(field, MEASURE, &Progress::default())
     }
 
-    /// The same land with every sample of every tile held.
+    /// Returns the same terrain with every sample of every tile in memory.
     fn held(field: &Field) -> Field {
         let [w, h] = field.size();
         let heights = (0..w * h).map(|k| field.height(k % w, k / w)).collect();

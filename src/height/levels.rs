@@ -1,5 +1,5 @@
-//! Surfaces of a field at coarser levels, and how far they are from the samples. Level ℓ has a vertex on every
-//! 2^ℓ-th sample and the diagonals of [`rtin`].
+//! Surfaces of a field at coarser levels, and their distance from the samples. Level ℓ has a vertex on every 2^ℓ-th
+//! sample and the diagonals of [`rtin`].
 
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ impl Patch<'_> {
         [0, 1].map(|k| (self.first[k] + (vertex[k] << self.level)).min(self.last[k]))
     }
 
-    /// The largest vertical distance, metres, of its cells from the samples in them, holes excepted.
+    /// Returns the largest vertical distance, metres, of its cells from the samples in them, holes excepted.
     pub fn deviation(&self) -> f32 {
         let row = |j: u32| self.row_deviation(j);
         let largest = (0..self.cells[1]).into_par_iter().map(row).reduce(|| 0.0, f64::max);
@@ -69,8 +69,8 @@ impl Patch<'_> {
         largest
     }
 
-    /// The same for the cells along its border, its sides `beyond` (1 or 2) levels coarser: vertices that such
-    /// a side lacks lie on its edges.
+    /// Returns the largest vertical distance, metres, of its border cells from the samples if its sides are `beyond` (1
+    /// or 2) levels coarser. Vertices that a coarser side lacks lie on its edges.
     pub fn stitched_deviation(&self, beyond: u32) -> f32 {
         let [w, h] = self.cells;
         let rows = (0..h).into_par_iter().map(|j| {
@@ -144,15 +144,16 @@ impl Section {
     }
 }
 
-/// How much a level adds to the distance from the samples wherever its vertices may lie: the largest
-/// |h(p) − (h(p − a) + h(p + a)) / 2| over the samples p from `first` on, `side` along each axis, and over the four
-/// directions a in which p may be the midpoint of an edge of that level. Levels nest, so the sum over a level and
-/// all finer ones bounds the level's distance from the samples.
+/// Returns the distance, metres, that a level adds to those of finer levels, wherever its vertices lie.
+///
+/// It is the largest |h(p) − (h(p − a) + h(p + a)) / 2| over the samples p from `first` on, `side` along each axis, and
+/// over the four directions a in which p may be the midpoint of an edge of that level. Levels nest, so the sum over a
+/// level and all finer ones bounds the level's distance from the samples.
 pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32 {
     // Half an edge; once around a tiled axis changes nothing.
     let [a, b] = [0, 1].map(|k| {
         let (half, stored) = (1i64 << (level - 1), i64::from(field.stored()[k]));
-        // Outside is outside, however far.
+        // Beyond the samples there is nothing, however far the edge reaches.
         if field.size()[k] > field.stored()[k] { half % stored } else { half.min(stored) }
     });
     let length = side[0] as usize + 1;
@@ -170,11 +171,11 @@ pub fn detail(field: &Field, first: [u32; 2], side: [u32; 2], level: u32) -> f32
     (largest as f32).next_up() * f32::from(largest > 0.0)
 }
 
-/// The largest distance of a height from the mean of two others, where all three are numbers.
+/// Returns the largest distance of a height from the mean of two others, where all three are numbers.
 fn largest_bend(middle: &[f64], from: &[f64], to: &[f64]) -> f64 {
     let bend = |middle: f64, from: f64, to: f64| (middle - (from + to) / 2.0).abs();
     let [(middle, last_middle), (from, last_from), (to, last_to)] = [middle, from, to].map(|row| row.as_chunks::<8>());
-    // As many maxima side by side as fill the widest registers.
+    // Eight independent maxima fill the widest vector registers.
     let mut largest = [0.0f64; 8];
     for ((middle, from), to) in middle.iter().zip(from).zip(to) {
         for (lane, largest) in largest.iter_mut().enumerate() {
@@ -186,7 +187,7 @@ fn largest_bend(middle: &[f64], from: &[f64], to: &[f64]) -> f64 {
     last.chain(largest).fold(0.0, f64::max)
 }
 
-/// Heights along a row of the field repeated without end along its tiled axes; no numbers outside.
+/// Returns heights along a row of the field, which repeats endlessly along its tiled axes; NaN outside.
 fn heights(field: &Field, first: i64, z: i64, count: usize) -> Vec<f64> {
     let Some(z) = wrapped(field, 1, z) else { return vec![f64::NAN; count] };
     let width = field.stored()[0] as usize;
@@ -201,7 +202,7 @@ fn heights(field: &Field, first: i64, z: i64, count: usize) -> Vec<f64> {
     row
 }
 
-/// The stored place along an axis of a place on the field repeated without end if it is tiled; `None` outside.
+/// Returns the stored position along an axis, which repeats endlessly if it is tiled; `None` outside.
 fn wrapped(field: &Field, axis: usize, at: i64) -> Option<usize> {
     let count = i64::from(field.stored()[axis]);
     let is_tiled = field.size()[axis] > field.stored()[axis];

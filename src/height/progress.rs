@@ -1,4 +1,4 @@
-//! How far work on a field has come: told by who works, asked by who waits, from any thread.
+//! Progress of long work on a field, counted by the workers and read from any thread.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,17 +8,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Progress(Arc<[AtomicU64; 2]>);
 
 impl Progress {
-    /// So many more steps are to be done.
+    /// Adds steps to be done.
     pub fn expect(&self, steps: u64) {
         self.0[1].fetch_add(steps, Ordering::Relaxed);
     }
 
-    /// So many more steps are done.
+    /// Adds steps that are done.
     pub fn advance(&self, steps: u64) {
         self.0[0].fetch_add(steps, Ordering::Relaxed);
     }
 
-    /// The share that is done, 0 to 1; `None` as long as nobody has said how much there is to do.
+    /// Returns the share that is done, 0 to 1; `None` before the first [`Self::expect`].
     pub fn share(&self) -> Option<f64> {
         let [done, all] = [0, 1].map(|k| self.0[k].load(Ordering::Relaxed));
         (all > 0).then(|| (done as f64 / all as f64).min(1.0))

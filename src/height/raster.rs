@@ -1,335 +1,184 @@
-//! What every loader yields, and the common way from there to a field.
+//! A grid of samples in memory.
 
-use super::{
-    Error, Field, Holes, Samples,
-    affine::Turn,
-    georef::Place,
-    load::{HoleFill, Loaded, Options},
-    located::Footprint,
-    rounding,
-    sidecar::Georeference,
-    unplaced,
-};
+use std::sync::Arc;
 
-/// The farthest from 0 that a height may be, metres: f64 holds a tenth of a millimetre there.
-const FARTHEST_M: f64 = 1e12;
+use super::source::{Coverage, HeightSource};
+use super::{Holes, Samples};
 
-/// Samples as a file stores them, before crop, holes and metres.
-pub(super) struct Raster {
-    /// Name of the file format.
-    pub format: &'static str,
-    /// How the file stores a sample.
-    pub sample_type: String,
-    /// Samples along (x, z).
-    pub size: [u32; 2],
-    /// The values, in the order of the file.
-    pub samples: Samples,
-    /// Samples that the file marks as missing otherwise than by a value.
-    pub holes: Holes,
-    /// The value that means "no data", times `step`.
-    pub nodata: Option<f64>,
-    /// Units a value counts.
-    pub step: f64,
-    /// The band's own scale, which multiplies that.
-    pub scale: f64,
-    /// Added to the scaled value, units.
-    pub offset: f64,
-    /// Metres a unit.
-    pub unit: f64,
-    /// Statements about position and units that are yet to be settled.
-    pub georeference: Georeference,
-    /// Position of the samples once turned.
-    pub place: Option<Place>,
-    /// The turn that lays the file's samples north up.
-    pub turn: Turn,
-    /// What the user should know.
-    pub warnings: Vec<String>,
+/// Samples in memory, row by row from the north-west corner. Clones share them.
+#[derive(Clone, Debug)]
+pub struct Raster {
+    samples: Arc<Samples>,
+    holes: Arc<Holes>,
+    size: [u32; 2],
+}
+
+/// Lowest, highest and mean height of the samples that are no holes, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Lowest.
+    pub min: f32,
+    /// Highest.
+    pub max: f32,
+    /// Mean.
+    pub mean: f64,
 }
 
 impl Raster {
-    /// Values in metres without holes or place.
-    pub fn new(format: &'static str, sample_type: &str, size: [u32; 2], samples: Samples) -> Self {
-        let holes = Holes::none(samples.len());
-        Self {
-            format,
-            sample_type: sample_type.to_owned(),
-            size,
-            samples,
-            holes,
-            nodata: None,
-            step: 1.0,
-            scale: 1.0,
-            offset: 0.0,
-            unit: 1.0,
-            georeference: Georeference::default(),
-            place: None,
-            turn: Turn::default(),
-            warnings: Vec::new(),
-        }
+    /// Makes a raster of `x_count · z_count` samples. Samples under holes may hold anything and are filled.
+    ///
+    /// # Panics
+    /// If the number of samples is not `x_count · z_count`, or a side is below 2.
+    pub fn new(mut samples: Samples, [x_count, z_count]: [u32; 2], holes: Holes) -> Self {
+        assert!(x_count >= 2 && z_count >= 2, "a field has at least 2 × 2 samples");
+        assert_eq!(samples.len(), x_count as usize * z_count as usize);
+        let size = [x_count, z_count];
+        fill_holes(&mut samples, &holes, size);
+        Self { samples: Arc::new(samples), holes: Arc::new(holes), size }
     }
 
-    /// Applies the wishes and makes the field.
-    pub fn finish(mut self, name: &str, options: &Options) -> Result<Loaded, Error> {
-        let whole = self.size;
-        self.rearrange(name, options)?;
-        self.make_holes(options);
-        let range = self.check_range();
-        self.blank_holes(range);
-        self.samples = self.samples.compacted();
-        self.assume_scale(options, range);
-        self.scale_to_metres(name, options, range)?;
-        let metres = self.step * self.scale * self.unit;
-        self.warnings.extend(rounding::warning(&self.sample_type, range, metres));
-        let exact_in_16_bit = matches!(self.samples, Samples::Coded { .. });
-        let (spacing, origin) = self.lie(name, options)?;
-        let tiles = tiles(name, self.size, options)?;
-
-        let mut field = Field::new(self.samples, self.size, spacing, self.holes).tiled(tiles);
-        field.origin = origin;
-        field.crs = self.place.as_ref().and_then(|place| place.crs.clone());
-        if options.hole_fill == HoleFill::Interpolate {
-            field = field.without_holes();
-        }
-        let Self { format, sample_type, place, warnings, .. } = self;
-        let first = options.crop.map_or([0, 0], |[x, z, ..]| [x, z]);
-        let footprint = Footprint { whole, first, place };
-        let sources = Vec::new();
-        Ok(Loaded { field, format, sample_type, exact_in_16_bit, footprint, warnings, sources })
-    }
-
-    /// The same values with rows from north to south, columns from west to east, and holes in place of its nodata value.
-    pub fn settled(mut self, name: &str, options: &Options) -> Result<Self, Error> {
-        self.rearrange(name, &Options { crop: None, ..options.clone() })?;
-        self.make_holes(options);
-        (self.nodata, self.turn) = (None, Turn::default());
-        Ok(self)
-    }
-
-    /// Crops, and turns the rows to run from north to south and the columns from west to east.
-    fn rearrange(&mut self, name: &str, options: &Options) -> Result<(), Error> {
-        let Turn { transposed, flip } = self.turn;
-        let [w, h] = if transposed { [self.size[1], self.size[0]] } else { self.size };
-        let [x, z, crop_w, crop_h] = options.crop.unwrap_or([0, 0, w, h]);
-        let fits = |at: u32, n: u32, side: u32| n >= 2 && at.checked_add(n).is_some_and(|end| end <= side);
-        if !fits(x, crop_w, w) || !fits(z, crop_h, h) {
-            let what = format!("expected at least 2x2 samples within {w}x{h}, found {crop_w}x{crop_h} at {x},{z}");
-            return Err(Error::new(name, "--crop", what));
-        }
-        if [x, z, crop_w, crop_h] == [0, 0, w, h] && self.turn == Turn::default() {
-            return Ok(());
-        }
-        // Samples of the file from one column, and from one row, to the next.
-        let stride = if transposed { [self.size[0] as usize, 1] } else { [1, self.size[0] as usize] };
-        let source = |n: u32, side: u32, flip: bool| if flip { side - 1 - n } else { n } as usize;
-        let columns: Vec<usize> = (x..x + crop_w).map(|i| source(i, w, flip[0]) * stride[0]).collect();
-        let rows = (z..z + crop_h).map(|j| source(j, h, flip[1]) * stride[1]);
-        let order = rows.flat_map(|row| columns.iter().map(move |column| row + column));
-
-        let mut holes = Holes::none(crop_w as usize * crop_h as usize);
-        order.clone().enumerate().filter(|&(_, k)| self.holes.contains(k)).for_each(|(to, _)| holes.insert(to));
-        self.samples = match &self.samples {
-            Samples::F32(heights) => Samples::F32(order.map(|k| heights[k]).collect()),
-            &Samples::Coded { ref codes, zero, scale } => {
-                Samples::Coded { codes: order.map(|k| codes[k]).collect(), zero, scale }
-            }
-        };
-        self.holes = holes;
-        self.size = [crop_w, crop_h];
-        self.place = self.place.take().map(|place| place.moved([x, z]));
-        Ok(())
-    }
-
-    /// The lowest and highest value, with a warning about what looks like nodata.
-    fn check_range(&mut self) -> [f32; 2] {
-        let (mut low, mut high) = (Edge::default(), Edge::default());
-        for k in (0..self.samples.len()).filter(|&k| self.holes.count() == 0 || !self.holes.contains(k)) {
-            let value = self.samples.height(k);
-            low.add(value);
-            high.add(-value);
-        }
-        if low.count == 0 {
-            self.warnings.push("no sample has data".to_owned());
-            return [0.0, 0.0];
-        }
-        let (min, max) = (low.value, -high.value);
-        let looks_like_nodata = [(min, low.count, low.next, max), (max, high.count, -high.next, min)]
-            .into_iter()
-            .filter(|&(value, count, next, other)| {
-                let (gap, rest) = (distance(value, next), distance(next, other));
-                count > 1
-                    && next.is_finite()
-                    && rest > 0.0
-                    && gap > rest * if is_usual(f64::from(value) * self.step) { 0.25 } else { 4.0 }
-            });
-        for (value, count, next, _) in looks_like_nodata {
-            let (value, next) = (f64::from(value) * self.step, f64::from(next) * self.step);
-            self.warnings.push(format!(
-                "{count} samples are {value}, far from the next value {next}: undeclared nodata? --nodata {value} makes them holes"
-            ));
-        }
-        [min, max]
-    }
-
-    /// Gives samples under holes a value that is in range, so that they decide nothing.
-    fn blank_holes(&mut self, [min, _]: [f32; 2]) {
-        if let Samples::F32(heights) = &mut self.samples
-            && self.holes.count() > 0
-        {
-            let holes = &self.holes;
-            heights.iter_mut().enumerate().filter(|(k, _)| holes.contains(*k)).for_each(|(_, h)| *h = min);
-        }
-    }
-
-    /// Warns where nothing states spacing or scale, and makes up a scale where values cannot be metres.
-    fn assume_scale(&mut self, options: &Options, range: [f32; 2]) {
-        if self.place.is_some() || options.spacing.is_some() {
-            return;
-        }
-        let has_scale = self.scale != 1.0 || self.unit != 1.0 || options.height_scale.is_some();
-        if let Some(unplaced::Assumed { scale, warning }) =
-            unplaced::assume(self.format, &self.sample_type, self.size, range, has_scale)
-        {
-            self.scale *= scale;
-            self.warnings.push(warning);
-        }
-    }
-
-    /// Turns values into metres: (value · scale + offset) · unit · `--height-scale` + `--height-offset`.
-    fn scale_to_metres(&mut self, name: &str, options: &Options, range: [f32; 2]) -> Result<(), Error> {
-        let metres = |unit: f64, shift: f64| (self.step * self.scale * unit, self.offset * unit + shift);
-        let is_far = |value: f32, (factor, offset): (f64, f64)| {
-            !(0.0..=FARTHEST_M).contains(&(f64::from(value) * factor + offset).abs())
-        };
-        let own = metres(self.unit, 0.0);
-        if let Some(far) = range.into_iter().find(|&value| is_far(value, own)) {
-            let far = f64::from(far) * self.step;
-            let what = format!("expected at most 1e12 m, found {far:e}; --nodata {far:e} makes it a hole");
-            return Err(Error::new(name, "heights", what));
-        }
-        let (factor, offset) = metres(self.unit * options.height_scale.unwrap_or(1.0), options.height_offset);
-        if options.height_scale == Some(0.0) {
-            return Err(Error::new(name, "--height-scale", "expected a number other than 0, found 0"));
-        }
-        let is_usable = |factor: f64| factor.is_finite() && factor as f32 != 0.0;
-        if !is_usable(factor) || range.iter().any(|&value| is_far(value, (factor, offset))) {
-            let what = format!("expected heights of at most 1e12 m, found {range:?} times {factor} plus {offset}");
-            let place = match options.height_scale {
-                _ if !is_usable(own.0) => "scale of the band",
-                Some(_) => "--height-scale",
-                None => "--height-offset",
-            };
-            return Err(Error::new(name, place, what));
-        }
-        if offset != 0.0 {
-            self.samples.scale_and_shift(factor, offset);
-        } else if factor != 1.0 {
-            self.samples.multiply(factor as f32);
-        }
-        Ok(())
-    }
-
-    /// Spacing and origin, metres.
-    fn lie(&self, name: &str, options: &Options) -> Result<([f64; 2], [f64; 2]), Error> {
-        let (spacing, origin) = match &self.place {
-            Some(place) => place.spacing_and_origin(self.size[1]),
-            None => ([1.0; 2], [0.0; 2]),
-        };
-        let spacing = options.spacing.unwrap_or(spacing);
-        // Positions are f64 metres and become f32 about the eye: both ends far beyond any planet.
-        if spacing.iter().any(|s| !(1e-6..=1e9).contains(s)) || origin.iter().any(|o| !(-1e12..=1e12).contains(o)) {
-            let what = format!("expected a spacing of 1e-6 to 1e9 m, found {spacing:?} m at {origin:?} m");
-            return Err(Error::new(name, "spacing", what));
-        }
-        Ok((spacing, origin))
-    }
-}
-
-/// Samples of a side of a field at most, tiling included: lattice coordinates are i32, and the last block of a
-/// level may end beyond the field by its own length.
-pub const MAX_SIDE: u32 = 1 << 30;
-
-/// How often the field repeats.
-fn tiles(name: &str, [w, h]: [u32; 2], options: &Options) -> Result<[u32; 2], Error> {
-    let [nx, nz] = options.tiles.unwrap_or([1, 1]);
-    if nx == 0 || nz == 0 {
-        return Err(Error::new(name, "--tile", format!("expected at least 1 tile each way, found {nx},{nz}")));
-    }
-    let fits = |n: u32, side: u32| n.checked_mul(side).is_some_and(|n| n <= MAX_SIDE);
-    match fits(nx, w) && fits(nz, h) {
-        true => Ok([nx, nz]),
-        false => Err(Error::new(
-            name,
-            "--tile",
-            format!("expected at most 2^30 samples a side, found {nx}x{nz} tiles of {w}x{h}"),
-        )),
-    }
-}
-
-/// The lowest value, how often it occurs, and the lowest value above it.
-struct Edge {
-    value: f32,
-    count: u64,
-    next: f32,
-}
-
-impl Default for Edge {
-    fn default() -> Self {
-        Self { value: f32::INFINITY, count: 0, next: f32::INFINITY }
-    }
-}
-
-impl Edge {
+    /// Returns the samples, row by row.
     #[inline]
-    fn add(&mut self, value: f32) {
-        if value > self.value {
-            self.next = self.next.min(value);
-        } else if value < self.value {
-            *self = Self { value, count: 1, next: self.value };
-        } else {
-            self.count += 1;
-        }
+    pub fn samples(&self) -> &Samples {
+        &self.samples
     }
-}
 
-fn distance(a: f32, b: f32) -> f64 {
-    (f64::from(a) - f64::from(b)).abs()
-}
-
-/// Whether a value is one that programs like to mean "no data".
-fn is_usual(value: f64) -> bool {
-    // −10000 m is black in Mapbox Terrain-RGB.
-    const USUAL: [f64; 9] = [-32768.0, -32767.0, 32767.0, 65535.0, -9999.0, -10000.0, -99999.0, -999.0, 9999.0];
-    USUAL.iter().any(|usual| (value - usual).abs() < 1e-3)
-}
-
-impl Samples {
-    /// The same heights as 16-bit codes where that loses nothing: all are whole multiples of 2^-k metres for
-    /// some k of 0..=8, and span no more than 65535 of them.
-    pub fn compacted(self) -> Self {
-        let Samples::F32(heights) = self else { return self };
-        match compact_scale(&heights) {
-            Some((low, scale)) => {
-                let codes = heights.iter().map(|&h| (f64::from(h) / scale - low) as u16).collect();
-                Samples::Coded { codes, zero: -low as f32, scale: scale as f32 }
-            }
-            None => Samples::F32(heights),
-        }
+    /// Returns the holes among the samples.
+    #[inline]
+    pub fn holes(&self) -> &Holes {
+        &self.holes
     }
-}
 
-/// The lowest height in multiples of the scale, and the scale, of codes that hold all heights.
-fn compact_scale(heights: &[f32]) -> Option<(f64, f64)> {
-    let (mut min, mut max, mut finest) = (f64::INFINITY, f64::NEG_INFINITY, 1.0f64);
-    for height in heights.iter().map(|&h| f64::from(h)) {
-        while (height * finest).fract() != 0.0 {
-            finest *= 2.0;
-            if finest > 256.0 || !height.is_finite() {
-                return None;
+    #[inline]
+    fn index(&self, i: u32, j: u32) -> usize {
+        j as usize * self.size[0] as usize + i as usize
+    }
+
+    /// Returns the indices of the samples of row `j` between two columns, both inclusive.
+    fn row(&self, j: u32, [first, last]: [u32; 2]) -> std::ops::Range<usize> {
+        self.index(first, j)..self.index(last, j) + 1
+    }
+
+    /// Returns the statistics of the samples that are no holes; zeros if all are holes.
+    pub fn statistics(&self) -> Statistics {
+        let (mut min, mut max, mut sum, mut count) = (f32::INFINITY, f32::NEG_INFINITY, 0.0, 0u64);
+        for k in 0..self.samples.len() {
+            if self.holes.count() == 0 || !self.holes.contains(k) {
+                let h = self.samples.height(k);
+                (min, max, sum, count) = (min.min(h), max.max(h), sum + f64::from(h), count + 1);
             }
         }
-        (min, max) = (min.min(height), max.max(height));
+        match count {
+            0 => Statistics { min: 0.0, max: 0.0, mean: 0.0 },
+            _ => Statistics { min, max, mean: sum / count as f64 },
+        }
     }
-    let (low, high) = (min * finest, max * finest);
-    let exact = f64::from(1 << 24);
-    (high - low <= 65535.0 && low.abs() <= exact && high.abs() <= exact).then_some((low, 1.0 / finest))
+
+    /// Returns the same samples without holes: those under holes keep the heights that were filled in.
+    pub fn without_holes(&self) -> Self {
+        Self { holes: Arc::new(Holes::none(self.samples.len())), ..self.clone() }
+    }
+
+    /// Returns the same samples with data only at holes and next to them.
+    pub fn around_holes(&self) -> Self {
+        let [w, h] = self.size.map(|n| n as usize);
+        let near = |k: usize| {
+            let (i, j) = (k % w, k / w);
+            let mut around = (j.saturating_sub(1)..=(j + 1).min(h - 1))
+                .flat_map(|j| (i.saturating_sub(1)..=(i + 1).min(w - 1)).map(move |i| j * w + i));
+            around.any(|k| self.holes.contains(k))
+        };
+        let mut holes = Holes::none(self.samples.len());
+        (0..self.samples.len()).filter(|&k| !near(k)).for_each(|k| holes.insert(k));
+        Self { holes: Arc::new(holes), ..self.clone() }
+    }
+}
+
+impl HeightSource for Raster {
+    #[inline]
+    fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    #[inline]
+    fn height(&self, i: u32, j: u32) -> f32 {
+        self.samples.height(self.index(i, j))
+    }
+
+    #[inline]
+    fn is_hole(&self, i: u32, j: u32) -> bool {
+        self.holes.count() > 0 && self.holes.contains(self.index(i, j))
+    }
+
+    fn raster(&self) -> &Raster {
+        self
+    }
+
+    fn coverage(&self) -> Coverage {
+        Coverage::Whole
+    }
+
+    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
+        Arc::new(raster)
+    }
+
+    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
+        let rows = (first[1]..=last[1]).map(|j| self.row(j, [first[0], last[0]]));
+        rows.fold([f32::INFINITY, f32::NEG_INFINITY], |range, row| self.samples.range(row, range))
+    }
+}
+
+/// Fills the samples under holes by push-pull.
+///
+/// Means of the known samples are taken on ever coarser grids. Each hole then takes the value of the finest coarser
+/// cell that has one, bilinearly.
+fn fill_holes(samples: &mut Samples, holes: &Holes, size: [u32; 2]) {
+    if holes.count() == 0 {
+        return;
+    }
+    let [w, h] = size.map(|n| n as usize);
+    let base: Vec<f32> =
+        (0..samples.len()).map(|k| if holes.contains(k) { f32::NAN } else { samples.height(k) }).collect();
+    for (k, height) in pull(base, w, h).into_iter().enumerate() {
+        if holes.contains(k) {
+            samples.set(k, height);
+        }
+    }
+}
+
+/// Fills the NaNs of a grid from the means of 2 × 2 blocks, recursively.
+fn pull(mut grid: Vec<f32>, w: usize, h: usize) -> Vec<f32> {
+    if !grid.iter().any(|v| v.is_nan()) {
+        return grid;
+    }
+    if w == 1 && h == 1 {
+        return vec![0.0];
+    }
+    let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
+    let mut half = Vec::with_capacity(half_w * half_h);
+    for j in 0..half_h {
+        for i in 0..half_w {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (x, z) in [(2 * i, 2 * j), (2 * i + 1, 2 * j), (2 * i, 2 * j + 1), (2 * i + 1, 2 * j + 1)] {
+                if x < w && z < h && !grid[z * w + x].is_nan() {
+                    sum += f64::from(grid[z * w + x]);
+                    count += 1.0;
+                }
+            }
+            half.push((sum / count) as f32);
+        }
+    }
+    let half = pull(half, half_w, half_h);
+    for (k, value) in grid.iter_mut().enumerate().filter(|(_, v)| v.is_nan()) {
+        let at = |n: usize, last: usize| {
+            let t = (n as f32 - 0.5) / 2.0;
+            let low = t.max(0.0) as usize;
+            (low, (low + 1).min(last), (t - low as f32).clamp(0.0, 1.0))
+        };
+        let (i0, i1, u) = at(k % w, half_w - 1);
+        let (j0, j1, v) = at(k / w, half_h - 1);
+        let row = |j: usize| half[j * half_w + i0] * (1.0 - u) + half[j * half_w + i1] * u;
+        *value = row(j0) * (1.0 - v) + row(j1) * v;
+    }
+    grid
 }

@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written under another name beside the place, and then renamed.
+//! Atomic writes: a file is written under a temporary name in its folder, and then renamed.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -10,7 +10,7 @@ use tempfile::NamedTempFile;
 /// A file while it is written.
 pub type Out<'a> = BufWriter<&'a File>;
 
-/// Files that do not have their final name yet.
+/// Temporary files that are not renamed yet.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file beside `path` and then gives it that name: readers see the old file or the new one, never a part.
@@ -28,13 +28,13 @@ fn begin(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut unfinished = lock();
-    // The error names the temporary file, which does not matter.
+    // The error would name the temporary file.
     let file = builder.tempfile_in(folder).map_err(|e| io::Error::new(e.kind(), e.kind().to_string()))?;
     unfinished.push(file.path().to_owned());
     Ok(file)
 }
 
-/// What fails leaves no file: dropping a temporary one removes it.
+/// Writes and renames a temporary file. On failure no file remains: dropping a temporary one removes it.
 fn fill(file: NamedTempFile, path: &Path, write: impl FnOnce(&mut Out) -> io::Result<()>) -> io::Result<()> {
     let mut out = BufWriter::new(file.as_file());
     write(&mut out)?;
@@ -44,11 +44,11 @@ fn fill(file: NamedTempFile, path: &Path, write: impl FnOnce(&mut Out) -> io::Re
     Ok(())
 }
 
-/// Removes what is not whole, for a process that ends at once: from now on no file is begun any more.
+/// Removes all unfinished files and blocks new ones, for a process that ends at once.
 pub fn discard_unfinished() {
     let unfinished = lock();
     for path in unfinished.iter() {
-        // What has got its name meanwhile is whole.
+        // A file renamed in the meantime is complete.
         let _ = std::fs::remove_file(path);
     }
     std::mem::forget(unfinished);

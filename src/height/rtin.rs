@@ -1,8 +1,7 @@
-//! The right-triangle pattern of every surface over the lattice, the samples' own included: cell diagonals
-//! alternate with the parity of i + j, so that every odd vertex of a level lies on an edge of the next coarser
-//! one, and a quarter turn maps the pattern onto itself.
+//! The right-triangle pattern of every surface over the lattice. Cell diagonals alternate with the parity of i + j. Every
+//! odd vertex of a level thus lies on an edge of the next coarser level, and a quarter turn maps the pattern onto itself.
 
-/// The two triangles of cell `(i, j)`, counter-clockwise from above, as vertex positions.
+/// Returns the two triangles of cell `(i, j)`, counter-clockwise from above, as vertex positions.
 pub fn cell(i: i32, j: i32) -> [[[i32; 2]; 3]; 2] {
     let [a, b, c, d] = [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]];
     if (i + j) & 1 == 0 { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] }

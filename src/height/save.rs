@@ -10,7 +10,7 @@ use tiff::tags::{Predictor, Tag};
 pub use super::replace::{Out, discard_unfinished, replace};
 use super::{Error, Field, Samples};
 
-/// Writes all samples of `field`, tiling included, in the format of the extension, or leaves what was there.
+/// Writes all samples of `field`, tiling included, in the format of the extension. On failure an existing file stays.
 ///
 /// | extension | holds |
 /// |---|---|
@@ -35,7 +35,7 @@ pub fn save(field: &Field, path: &Path) -> Result<(), Error> {
 
 /// Heights as 16-bit codes: height = (code − zero) · scale.
 ///
-/// Whole metres of 0 to 65535 are their own codes; a field held in codes keeps them; any other is stretched over all
+/// Whole metres of 0 to 65535 are their own codes. A field in codes keeps them. Other heights are stretched over all
 /// codes, lowest to highest.
 pub struct Codes {
     /// One a sample, row by row.
@@ -74,7 +74,7 @@ fn range(field: &Field) -> (f64, f64) {
     heights(field).map(f64::from).fold(start, |(low, high), h| (low.min(h), high.max(h)))
 }
 
-/// What stands for a hole: −9999 by custom, unless the land goes as deep.
+/// Returns the value for holes: −9999 by custom, or lower if the terrain reaches that deep.
 fn hole_mark(field: &Field) -> f32 {
     if range(field).0 > -9999.0 { -9999.0 } else { f32::MIN }
 }

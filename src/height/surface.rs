@@ -1,5 +1,5 @@
-//! Surfaces over the lattice: triangles whose corners lie on samples' positions, or between them on a finer lattice, and
-//! how far they are from the samples inside them.
+//! Surfaces over the lattice: triangles with corners on samples or on a finer lattice between them, and their distance
+//! from the samples inside.
 
 use std::ops::RangeInclusive;
 
@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Field, rtin};
 
-/// A corner of a drawn triangle: lattice position and height, metres. Positions are in samples, or, where *fraction bits*
-/// are said, in 2^−bits samples.
+/// A corner of a drawn triangle: lattice position and height, metres. Positions count samples, or 2^−bits samples where
+/// a number of *fraction bits* is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Corner {
     /// East.
@@ -23,14 +23,15 @@ pub struct Corner {
 /// Three corners, counter-clockwise seen from above if the triangle faces up.
 pub type Triangle = [Corner; 3];
 
-/// Twice the area in plan, in squares of the positions' unit; positive if the triangle faces up, 0 if it is degenerate.
+/// Returns twice the area in plan, in squares of the positions' unit: positive if the triangle faces up, 0 if it is
+/// degenerate.
 pub fn doubled_area([a, b, c]: &Triangle) -> i64 {
     let (bx, bz) = (i64::from(b.x) - i64::from(a.x), i64::from(b.z) - i64::from(a.z));
     let (cx, cz) = (i64::from(c.x) - i64::from(a.x), i64::from(c.z) - i64::from(a.z));
     bz * cx - bx * cz
 }
 
-/// World position of a corner with so many fraction bits.
+/// Returns the world position, metres, of a corner with this number of fraction bits.
 pub fn world(field: &Field, corner: &Corner, fraction_bits: u32) -> DVec3 {
     let [x, z] = [corner.x, corner.z].map(|n| f64::from(n) / f64::from(1u32 << fraction_bits));
     field.world_at(x, z, f64::from(corner.y))
@@ -42,7 +43,7 @@ pub fn visit_samples(triangle: &Triangle, visit: impl FnMut(u32, u32, f64)) {
     visit_samples_between(triangle, 0, visit);
 }
 
-/// The same for corners with so many fraction bits.
+/// Calls `visit` like [`visit_samples`], for corners with this number of fraction bits.
 pub fn visit_samples_between(triangle: &Triangle, fraction_bits: u32, mut visit: impl FnMut(u32, u32, f64)) {
     let area = doubled_area(triangle);
     debug_assert!(area > 0, "faces up: {triangle:?}");
@@ -69,10 +70,10 @@ pub fn visit_samples_between(triangle: &Triangle, fraction_bits: u32, mut visit:
     }
 }
 
-/// Rows up to this long are searched for their ends; for longer ones the divisions cost less.
+/// Longest row, samples, whose ends are found by search; for longer rows divisions cost less.
 const SEARCHED: i64 = 16;
 
-/// The x between `west` and `east` at which all edge functions [slope, value at 0] of a row are at least 0.
+/// Returns the x between `west` and `east` at which all edge functions [slope, value at 0] of a row are at least 0.
 fn span(row: &[[i64; 2]; 3], west: i64, east: i64) -> RangeInclusive<i64> {
     if east - west <= SEARCHED {
         let inside = |x: &i64| row.iter().all(|[slope, value]| slope * x + value >= 0);
@@ -93,19 +94,19 @@ fn span(row: &[[i64; 2]; 3], west: i64, east: i64) -> RangeInclusive<i64> {
     first..=last
 }
 
-/// Whether a triangle of the samples' own surface has data at its three corners.
+/// Returns true if a triangle of the finest surface has data at its three corners.
 pub fn is_terrain(field: &Field, triangle: &[[i32; 2]; 3]) -> bool {
     triangle.iter().all(|&[x, z]| !field.is_hole(x as u32, z as u32))
 }
 
-/// Whether there is a triangle with data between two lattice positions, both inclusive.
+/// Returns true if there is a triangle with data between two lattice positions, both inclusive.
 pub fn has_terrain(field: &Field, first: [i32; 2], last: [i32; 2]) -> bool {
     let mut cells = (first[1]..last[1]).flat_map(|j| (first[0]..last[0]).map(move |i| (i, j)));
     field.holes().count() == 0 || cells.any(|(i, j)| rtin::cell(i, j).iter().any(|t| is_terrain(field, t)))
 }
 
-/// Height of the samples' own triangles, metres, at a position among the samples; `None` outside or where the triangle
-/// has no data.
+/// Returns the height of the finest surface, metres, at a position in samples; `None` outside or where the triangle has
+/// no data.
 pub fn height_at(field: &Field, at: [f64; 2]) -> Option<f64> {
     let last = field.size().map(|n| f64::from(n) - 1.0);
     if !(0..2).all(|k| (0.0..=last[k]).contains(&at[k])) {
@@ -125,8 +126,8 @@ pub fn height_at(field: &Field, at: [f64; 2]) -> Option<f64> {
     is_terrain(field, &triangle).then(|| weights(&triangle).iter().zip(triangle).map(|(w, p)| w * height(p)).sum())
 }
 
-/// The largest vertical distance, metres, of an up-facing triangle from the field's samples inside it,
-/// holes excepted.
+/// Returns the largest vertical distance, metres, of an up-facing triangle from the field's samples inside it, holes
+/// excepted.
 pub fn deviation(field: &Field, triangle: &Triangle) -> f32 {
     let mut largest = 0.0f64;
     visit_samples(triangle, |x, z, y| {

@@ -1,4 +1,4 @@
-//! What is written is read back.
+//! Files of every format and layout are read back exactly.
 
 use cuesta::height::{Field, Loaded, Options, Samples, load_bytes};
 use png::{BitDepth, ColorType};

@@ -7,14 +7,14 @@ use super::tiff_file::{LZW, NONE, TiffFile};
 const CLEAR: u32 = 256;
 const END: u32 = 257;
 
-/// The end of a writer's data.
+/// The end code that a writer leaves after its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum End {
-    /// With an end code as wide as the next code.
+    /// As wide as the next code.
     Wide,
-    /// With one as wide as the last code.
+    /// As wide as the last code.
     Narrow,
-    /// With none.
+    /// No end code.
     Absent,
 }
 

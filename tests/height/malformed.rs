@@ -1,4 +1,4 @@
-//! Whatever the bytes: a field or an error of one line, soon, and never a panic.
+//! Any bytes yield a field or an error of one line, quickly and without a panic.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -9,10 +9,10 @@ use super::{
     tiny::{self, Tiny},
 };
 
-/// Single bits are flipped in so many first and last bytes, where headers and directories are.
+/// Bytes at the beginning and at the end in which single bits are flipped: headers and directories.
 const HEADER: usize = 1200;
 
-/// Loads changed bytes; returns whether they were refused.
+/// Loads changed bytes; returns true if they were refused.
 fn refused(file: &Tiny, what: &str, bytes: &[u8], hdr: Option<&[u8]>) -> bool {
     let loaded = catch_unwind(AssertUnwindSafe(|| file.load_as(bytes, hdr)));
     let loaded = loaded.unwrap_or_else(|_| panic!("{}: {what} panics", file.name));
@@ -85,7 +85,7 @@ fn every_flipped_byte_of_a_zipped_hgt_is_survived() {
     }
 }
 
-/// A file cannot make the program allocate what it merely claims.
+/// A file that claims more than it holds causes no large allocation.
 #[test]
 fn huge_claims_are_refused() {
     let tiff = |w: u64, h: u64| {
@@ -97,7 +97,7 @@ fn huge_claims_are_refused() {
     let dem = String::from_utf8(tiny::usgs_dem(|_| [0, 3])).unwrap();
     let far = dem.replacen("6.000000000000000D+05", "6.000000000000000D+11", 1).into_bytes();
     let many = dem.replacen("     1     5   ", "     199999   ", 1).into_bytes();
-    // Steps so many that neighbouring rows are the same number.
+    // Steps so small that neighbouring rows have the same coordinate.
     let fine = dem.replacen("  3.000000E1  3.000000E1", "  3.000000E1 1.000000E-9", 1);
     let fine = fine.replace("5.100000000000000D+06", "5.100000000000000D+11");
     let fine = fine.replacen("5.100000000000000D+11", "5.100000000000001D+11", 1).into_bytes();

@@ -177,7 +177,7 @@ fn units_and_types_meet_in_metres() {
         ]
     );
     assert_eq!(loaded.sample_type, "f32");
-    // Wishes about the whole.
+    // Options that apply to the mosaic.
     let options =
         Options { crop: Some([5, 1, 4, 2]), spacing: Some([2.0, 3.0]), tiles: Some([2, 1]), ..Options::default() };
     let field = load(folder.path(), &options).unwrap().field;
@@ -215,7 +215,7 @@ fn files_of_other_grids_are_refused_by_name() {
     assert!(error.contains("absent.tif"), "{error}");
 }
 
-/// Together files hold no more samples than one may, and the rectangle around them is not allocated before it is allowed.
+/// The limit of samples holds for all files together, and for the rectangle around them before it is allocated.
 #[test]
 fn the_limit_of_samples_holds_for_all_files() {
     let folder = folder(&[
@@ -266,7 +266,7 @@ fn companions_are_left_out_with_a_warning() {
     assert_eq!((loaded.field.size(), loaded.format), ([5, 4], "PNG"));
 }
 
-/// As in packages of ASTER, AW3D30 and Copernicus: names or types say which file has the heights.
+/// Packages such as those of ASTER, AW3D30 and Copernicus: names or types identify the file with the heights.
 #[test]
 fn of_files_of_the_same_samples_the_heights_are_read() {
     let byte = TiffFile { bits: 8, format: 1, ..at(0, 0) };
@@ -343,7 +343,7 @@ fn tiles_on_both_sides_of_the_antimeridian_are_neighbours() {
     assert!((origin - 179.0).abs() < 1e-9, "{origin}");
 }
 
-/// Members beyond a limit are never left out in silence.
+/// Members beyond a limit are an error, not left out silently.
 #[test]
 fn an_archive_of_too_many_members_is_refused() {
     let folder = tempdir().unwrap();
@@ -359,7 +359,7 @@ fn an_archive_of_too_many_members_is_refused() {
     assert!(error.contains("expected at most 65536 members") && !error.contains('\n'), "{error}");
 }
 
-/// A pipe would be waited for.
+/// Opening a pipe would block.
 #[cfg(unix)]
 #[test]
 fn a_pipe_in_a_tile_folder_is_refused() {

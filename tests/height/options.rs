@@ -1,4 +1,4 @@
-//! Holes, warnings and wishes.
+//! Holes, warnings and options.
 
 use cuesta::height::{HoleFill, Loaded, Options, load_bytes};
 
@@ -67,7 +67,7 @@ fn undeclared_nodata_is_named() {
         let flag = format!("--nodata {}", f64::from(value as f32));
         assert!(warning.starts_with("2 samples") && warning.contains(&flag), "{warning}");
     }
-    // A single spike, a plain beside a hill, and a slope are land.
+    // A single spike, a plain beside a hill, and a slope are terrain.
     let file = TiffFile::new([9, 9], 16, 2);
     let terrains: [fn(usize, usize) -> f64; 3] = [
         |i, j| if i == 3 && j == 3 { -9999.0 } else { (i + j) as f64 },

@@ -1,4 +1,4 @@
-//! Where samples lie.
+//! Position and spacing of samples.
 
 use std::fs;
 
@@ -59,7 +59,7 @@ fn geographic() {
     let [east, north] = metres_per_degree(45.0);
     close(field.spacing, [0.001 * east, 0.001 * north]);
     close(field.origin, [10.0005 * east, -45.0015 * north]);
-    // Beyond the pole there is nothing.
+    // Latitudes beyond the pole are invalid.
     let file = tiff().placed([0.001, 0.001], [10.0, 145.0]).keys(&[[1024, 2], [2048, 4326]]);
     assert!(load_bytes("p", &file.bytes(tiny::height), &Options::default()).is_err());
 }

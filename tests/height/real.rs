@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cuesta::height::{self, Encoding, Loaded, Options};
 
-/// The path of a shared data file; `None`, said aloud, where they are not.
+/// Returns the path of a shared data file; `None`, with a message, if the files are absent.
 pub fn shared(file: &str) -> Option<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     if !folder.is_dir() {
@@ -18,7 +18,7 @@ fn load(file: &str, options: &Options) -> Option<Loaded> {
     Some(height::load(&shared(file)?, options).unwrap())
 }
 
-/// What a file holds.
+/// The expected content of a file.
 struct Expected {
     file: &'static str,
     format: &'static str,

@@ -1,8 +1,8 @@
-//! Writes TIFFs of every layout by hand, for the `tiff` crate's encoder knows neither tiles nor big-endian files.
+//! A writer of TIFFs of every layout: the encoder of the `tiff` crate writes neither tiles nor big-endian files.
 
 use std::io::Write;
 
-/// How a file is laid out.
+/// The layout of a file.
 #[derive(Clone, Debug)]
 pub struct TiffFile {
     pub size: [usize; 2],

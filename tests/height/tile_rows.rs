@@ -127,7 +127,7 @@ fn empty_tiles_are_holes() {
     let options = Options { encoding: Some(Encoding::Mapbox), ..Options::default() };
     let error = load(folder(&files[..1]).path(), &options).unwrap_err().to_string();
     assert!(error.contains("tiles with data at zoom 1"), "{error}");
-    // An opaque picture of another size is no empty tile.
+    // An opaque picture of another size does not count as an empty tile.
     let files = [("1/0/0.png", tile(4, 1, 255)), ("1/1/0.png", tile(8, 10, 255))];
     let error = load(folder(&files).path(), &options).unwrap_err().to_string();
     assert!(error.contains("expected 4x4 pixels, found 8x8"), "{error}");
@@ -159,7 +159,7 @@ fn geodetic_and_local_profiles() {
     assert!(error.contains("units-per-pixel of order 1"), "{error}");
 }
 
-/// A tile's name is its number as it is written, and of two pictures of one tile the first by name counts.
+/// A tile's name is its plain number. Of two pictures of one tile the first by name counts.
 #[test]
 fn other_spellings_of_a_number_are_no_tiles() {
     let tiles = [("1/0/00.png", 9), ("1/0/+0.png", 8), ("1/0/0.png", 1), ("1/0/0.pngraw", 7), ("1/00/0.png", 6)];

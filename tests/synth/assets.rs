@@ -1,4 +1,4 @@
-//! The embedded terrain is what the program itself makes.
+//! The embedded terrain equals what the program generates.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What each kind is, and that its bytes stay.
+//! Properties of each kind of synthetic field, and hashes of their bytes.
 
 use std::str::FromStr;
 
@@ -6,7 +6,7 @@ use cuesta::height::synth::{KINDS, Kind, synth};
 use cuesta::height::{Field, Samples};
 use sha2::{Digest, Sha256};
 
-/// SHA-256 of the samples as they are kept, little-endian, in hexadecimal.
+/// Returns the SHA-256 of the samples in memory, little-endian, in hexadecimal.
 pub fn hash(samples: &Samples) -> String {
     let bytes: Vec<u8> = match samples {
         Samples::F32(heights) => heights.iter().flat_map(|h| h.to_le_bytes()).collect(),
@@ -35,7 +35,7 @@ fn names_and_kinds_are_the_same_list() {
     assert!(Kind::from_str("hilly").unwrap_err().contains("eroded"));
 }
 
-/// A change here changes what people have on their disks, and the embedded terrain with it: run `make_assets`.
+/// A change here changes fields that users have saved, and the embedded terrain: run `make_assets`.
 #[test]
 fn same_seed_same_bytes() {
     let pinned = [
@@ -108,7 +108,7 @@ fn large_peers_are_bit_exact() {
     assert_eq!(hash(field.samples()), "0730a6bd19e8b1d0a5391572e360d33db7c0ae619f4e2a8f91fa73fcf0188089");
 }
 
-/// Water must find its way off the land: no inner sample lies below all its neighbours.
+/// Water drains off the terrain: no inner sample lies below all its neighbours.
 #[test]
 fn eroded_terrain_has_no_pits() {
     let field = make(Kind::Eroded, [129, 97], 5);
@@ -119,7 +119,7 @@ fn eroded_terrain_has_no_pits() {
     }
 }
 
-/// Passages and rock, both a good part of it.
+/// Passages and rock both take a large part of a cave.
 #[test]
 fn a_cave_has_a_floor_a_ceiling_and_rock() {
     let [floor, ceiling] = [Kind::CaveFloor, Kind::CaveCeiling].map(|kind| make(kind, [257, 257], 2));

@@ -1,4 +1,4 @@
-//! One array of bicubic patches without end, of one width, whose control points a hash tells.
+//! An endless array of bicubic patches of one width, whose control points come from a hash.
 //!
 //! Neighbouring patches share their control points as those of a uniform cubic B-spline do: the surface has continuous
 //! second derivatives. In a patch that is the Bézier form with control points ((c₀ + 4c₁ + c₂)/6, (2c₁ + c₂)/3, …).
@@ -6,23 +6,22 @@
 use super::Area;
 use crate::height::synth::noise;
 
-/// The most patches along an axis of an area that are looked at one by one: of more, the ends of all control points
-/// bound what lies there.
+/// Most patches along an axis of an area that are bounded one by one; larger areas get the range of all control points.
 const MAX_ALONG: i64 = 3;
 
-/// The layer.
+/// One layer of patches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layer {
     seed: u64,
     width_m: f64,
-    /// Least and most of all control points.
+    /// Smallest and largest control point.
     ends: [f64; 2],
 }
 
-/// Ranges over an area.
+/// Ranges of values and derivatives over an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ranges {
-    /// Of values.
+    /// Lowest and highest value.
     pub value: [f64; 2],
     /// The largest slope in any direction, per metre.
     pub slope: f64,
@@ -31,7 +30,7 @@ pub struct Ranges {
 }
 
 impl Ranges {
-    /// Of values.
+    /// Returns the width of the range of values.
     pub fn width(&self) -> f64 {
         self.value[1] - self.value[0]
     }
@@ -40,7 +39,7 @@ impl Ranges {
 /// Rows of control points, four of a cubic along an axis or fewer of a derivative.
 type Net<const X: usize, const Z: usize> = [[f64; X]; Z];
 
-/// What is known of the patches of an area, per unit of width.
+/// Bounds of the patches of an area, for patches of width 1.
 #[derive(Clone, Copy)]
 struct Hull {
     value: [f64; 2],
@@ -49,7 +48,7 @@ struct Hull {
 }
 
 impl Layer {
-    /// Of a seed, with patches of a width, metres, and control points between two values.
+    /// Makes the layer of a seed, with patches of this width, metres, and control points between two values.
     pub fn new(seed: u64, width_m: f64, ends: [f64; 2]) -> Self {
         Self { seed, width_m, ends }
     }
@@ -59,7 +58,7 @@ impl Layer {
         self.width_m
     }
 
-    /// Least and most of all control points.
+    /// Returns the smallest and largest control point.
     pub fn ends(&self) -> [f64; 2] {
         self.ends
     }
@@ -74,26 +73,26 @@ impl Layer {
         [-1, 0, 1, 2].map(|dz| [-1, 0, 1, 2].map(|dx| self.control(x + dx, z + dz)))
     }
 
-    /// The patch of a place, and where in it.
+    /// Returns the patch at a place, and the position in it.
     fn patch(&self, at: [f64; 2]) -> ([i64; 2], [f64; 2]) {
         let share = at.map(|n| n / self.width_m);
         (share.map(|n| n.floor() as i64), share.map(|n| n - n.floor()))
     }
 
-    /// Value at a place.
+    /// Returns the value at a place.
     pub fn value(&self, at: [f64; 2]) -> f64 {
         let (patch, [u, v]) = self.patch(at);
         along(&self.controls(patch), weights(u), weights(v))
     }
 
-    /// Slopes at a place, per metre.
+    /// Returns the slopes at a place, per metre.
     pub fn slopes(&self, at: [f64; 2]) -> [f64; 2] {
         let (patch, [u, v]) = self.patch(at);
         let net = self.controls(patch);
         [along(&net, rates(u), weights(v)), along(&net, weights(u), rates(v))].map(|slope| slope / self.width_m)
     }
 
-    /// Ranges over an area.
+    /// Returns the ranges over an area.
     pub fn ranges(&self, area: &Area) -> Ranges {
         let (first, last) = (self.patch(area.min).0, self.patch(area.max).0);
         let is_wide = (0..2).any(|k| last[k] - first[k] >= MAX_ALONG);
@@ -107,7 +106,7 @@ impl Layer {
         }
     }
 
-    /// Derivatives are differences of control points.
+    /// Returns bounds that hold everywhere: derivatives are differences of control points.
     fn everywhere(&self) -> Hull {
         let width = self.ends[1] - self.ends[0];
         Hull { value: self.ends, largest: [width, width, 2.0 * width, 2.0 * width, 2.0 * width] }
@@ -145,7 +144,7 @@ fn weights(t: f64) -> [f64; 4] {
     [s * s * s / 6.0, (4.0 + t * t * (3.0 * t - 6.0)) / 6.0, (4.0 + s * s * (3.0 * s - 6.0)) / 6.0, t * t * t / 6.0]
 }
 
-/// Their derivatives.
+/// Returns the derivatives of the uniform cubic B-spline's weights.
 fn rates(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, -s * (3.0 * s - 4.0) / 2.0, t * t / 2.0]
@@ -181,12 +180,12 @@ fn derivative_2([a, b, c]: [f64; 3]) -> [f64; 2] {
     [2.0 * (b - a), 2.0 * (c - b)]
 }
 
-/// Columns as rows.
+/// Returns the transposed net.
 fn turned<const X: usize, const Z: usize>(net: &Net<X, Z>) -> Net<Z, X> {
     std::array::from_fn(|i| std::array::from_fn(|j| net[j][i]))
 }
 
-/// Least and most of the control points of a part of a net.
+/// Returns the smallest and largest control point of a part of a net.
 fn ends<const X: usize, const Z: usize>(net: &Net<X, Z>, [x, z]: [[f64; 2]; 2]) -> [f64; 2] {
     let rows = net.map(|row| part(row, x));
     let columns = (0..X).flat_map(|i| part(rows.map(|row| row[i]), z));

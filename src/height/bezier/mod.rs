@@ -1,25 +1,26 @@
-//! Land without samples: an array of Bézier patches with layers of displacement, evaluated wherever it is asked for,
-//! with bounds for every part of it.
+//! Procedural terrain: an array of Bézier patches with layers of displacement, evaluated at any position, with bounds
+//! for any area.
 //!
 //! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §1.1: "a two-dimensional array of Bezier patches,
 //! on which are layered procedurally-generated displacement maps". Here each layer is itself an array of bicubic
 //! patches, half as wide as those of the layer before ([`layer`]), so that one rule bounds them all: a patch lies
 //! within the hull of its control points, and so do its derivatives within that of theirs (G. Farin, "Curves and
-//! Surfaces for CAGD", §4 and §5). How rough the land is changes slowly from place to place.
+//! Surfaces for CAGD", §4 and §5). Roughness changes slowly from place to place.
 //!
-//! Bounds of a part are within those of what holds it. Heights are the same on every machine: + − × ÷ and floor of f64.
+//! Bounds of an area are within those of any area around it. Heights are the same on every machine: + − × ÷ and floor of
+//! f64.
 
 pub mod layer;
 
 use self::layer::{Layer, Ranges};
 
-/// Side of the land that is drawn, metres.
+/// Side of the terrain, metres.
 pub const SIDE_M: f64 = 524_288.0;
-/// Distance of the places at which it is drawn at most, metres, and how many there are along a side.
+/// Smallest distance of vertices, metres.
 pub const SPACING_M: f64 = 1.0 / 1024.0;
-/// See [`SPACING_M`].
+/// Lattice positions along a side, [`SPACING_M`] apart.
 pub const LATTICE: u32 = (1 << 29) + 1;
-/// Layers whose patches are 2 places wide or more.
+/// Number of displacement layers whose patches are at least 2 lattice steps wide.
 pub const LAYERS: u32 = 24;
 /// Width of the large patches, and heights of their control points, metres.
 const PATCH_M: f64 = 65_536.0;
@@ -27,16 +28,16 @@ const RELIEF_M: [f64; 2] = [0.0, 3600.0];
 /// Width of the patches of the first displacement layer and heights of their control points, ±, metres.
 const FIRST_M: f64 = 16_384.0;
 const FIRST_HEIGHT_M: f64 = 3600.0;
-/// Heights of a layer over those of the one before, whose patches are twice as wide: slopes hardly fade.
+/// Ratio of the heights of a layer to those of the one before, whose patches are twice as wide: slopes hardly fade.
 const GAIN: f64 = 0.47;
-/// Roughness, which displacement is multiplied by, and the width of its patches.
+/// Range of the roughness, a factor of the displacement, and the width of its patches, metres.
 const ROUGHNESS: [f64; 2] = [0.1, 1.0];
 const ROUGHNESS_M: f64 = 131_072.0;
 
-/// The most layers of displacement: positions in f64 tell the patches of further ones no more apart.
+/// Most layers of displacement: f64 positions do not resolve the patches of further ones.
 pub const MAX_LAYERS: u32 = 40;
 
-/// A square part of the plane, metres.
+/// A rectangle of the plane, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     /// Smallest corner.
@@ -45,7 +46,7 @@ pub struct Area {
     pub max: [f64; 2],
 }
 
-/// The land.
+/// Procedural terrain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bezier {
     patches: Layer,
@@ -53,21 +54,22 @@ pub struct Bezier {
     displacement: Vec<Layer>,
 }
 
-/// Bounds of the land over an area.
+/// Bounds of the terrain over an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Lowest and highest, metres.
     pub height_m: [f64; 2],
-    /// The furthest that the land is from any triangle over the area whose corners lie on it and whose longest side is
-    /// the one asked for, and its largest angle right, metres.
+    /// Largest vertical distance, metres, from any right triangle in the area whose corners lie on the terrain and whose
+    /// longest side is the requested one.
     pub deviation_m: f64,
-    /// The most by which heights change along a way in the area of steps, each shorter than the one before by √2, the
-    /// first one that longest side over √8, metres.
+    /// Largest change of height, metres, along a path in the area whose first step is the longest side over √8 and whose
+    /// further steps are each shorter by √2.
     pub way_m: f64,
 }
 
 impl Bezier {
-    /// Land of a seed with so many layers of displacement, the last 2^(1 − layers) times as wide as the first.
+    /// Makes the terrain of a seed with `layers` layers of displacement, at most [`MAX_LAYERS`]. Each has patches half as wide
+    /// as the one before.
     pub fn new(seed: u64, layers: u32) -> Self {
         let layer = |k: u32| {
             let (width_m, height_m) = (FIRST_M * 0.5f64.powi(k as i32), FIRST_HEIGHT_M * GAIN.powi(k as i32));
@@ -80,14 +82,14 @@ impl Bezier {
         }
     }
 
-    /// Height at a place, metres.
+    /// Returns the height at a position, metres.
     pub fn height(&self, at: [f64; 2]) -> f64 {
         let displacement: f64 = self.displacement.iter().map(|layer| layer.value(at)).sum();
         self.patches.value(at) + self.roughness.value(at) * displacement
     }
 
-    /// Slopes (x, z) at a place, of the layers whose patches are at least so wide: what is narrower than a pixel only
-    /// glitters.
+    /// Returns the slopes (x, z) at a position, of the layers whose patches are at least `width_m` wide. Layers narrower
+    /// than a pixel would only alias.
     pub fn slopes(&self, at: [f64; 2], width_m: f64) -> [f64; 2] {
         let (base, rough) = (self.patches.slopes(at), self.roughness.slopes(at));
         let roughness = self.roughness.value(at);
@@ -97,7 +99,7 @@ impl Bezier {
         [0, 1].map(|k| base[k] + rough[k] * displacement + roughness * displaced[k])
     }
 
-    /// Bounds over an area, for triangles with this longest side.
+    /// Returns bounds over an area, for triangles with this longest side, metres.
     pub fn bounds(&self, area: &Area, longest_m: f64) -> Bounds {
         let (base, rough) = (self.patches.ranges(area), self.roughness.ranges(area));
         let mut bounds =
@@ -111,7 +113,7 @@ impl Bezier {
         bounds
     }
 
-    /// Lowest and highest of all, metres.
+    /// Returns bounds of all heights, metres.
     pub fn range_m(&self) -> [f64; 2] {
         let max: f64 = self.displacement.iter().map(|layer| layer.ends()[1] * ROUGHNESS[1]).sum();
         [RELIEF_M[0] - max, RELIEF_M[1] + max]
@@ -119,20 +121,22 @@ impl Bezier {
 }
 
 impl Area {
-    /// The square about a place, up to a distance along the axes, metres.
+    /// Returns the square around a position that reaches `reach_m` along the axes, metres.
     pub fn about(at: [f64; 2], reach_m: f64) -> Self {
         Self { min: at.map(|n| n - reach_m), max: at.map(|n| n + reach_m) }
     }
 }
 
-/// How far a function is from its linear interpolation at the corners of a triangle whose longest side is its
-/// circumcircle's diameter: its largest second derivative times R²/2 (S. Waldron, "The error in linear interpolation at
-/// the vertices of a simplex", 1998); and never more than the width of its range.
+/// Returns a bound of a function's distance from its linear interpolation over a right triangle.
+///
+/// It is the largest second derivative times R²/2, with R half the longest side (S. Waldron, "The error in linear
+/// interpolation at the vertices of a simplex", 1998), and at most the width of the function's range.
 fn deviation(ranges: &Ranges, longest_m: f64) -> f64 {
     (ranges.bend * longest_m * longest_m / 8.0).min(ranges.width())
 }
 
-/// See [`Bounds::way_m`]: a step changes a function by its largest slope, and no more than its range is wide.
+/// Returns [`Bounds::way_m`] of a function: each step changes it by at most its largest slope, and by at most the width
+/// of its range.
 fn way(ranges: &Ranges, longest_m: f64) -> f64 {
     let (mut way, mut step) = (0.0, longest_m / 8f64.sqrt());
     while ranges.slope * step > ranges.width() {
@@ -141,7 +145,7 @@ fn way(ranges: &Ranges, longest_m: f64) -> f64 {
     way + ranges.slope * step / (1.0 - 0.5f64.sqrt())
 }
 
-/// Ranges of a product: derivatives by the product rule, from the largest absolute values.
+/// Returns the ranges of a product: derivatives by the product rule, from the largest absolute values.
 fn product(a: &Ranges, b: &Ranges) -> Ranges {
     let ends = [a.value[0] * b.value[0], a.value[0] * b.value[1], a.value[1] * b.value[0], a.value[1] * b.value[1]];
     let largest = |[low, high]: [f64; 2]| low.abs().max(high.abs());
@@ -171,8 +175,8 @@ mod tests {
         }
     }
 
-    /// From wedges of the whole land to those that f64 can hardly tell apart: points sown densely over triangles never
-    /// lie beyond the bounds, which are no trivial ones. With few layers small triangles are bounded by bends alone.
+    /// Random points over triangles of all sizes, down to the resolution of f64, lie within the bounds, and some come near
+    /// them. With few layers small triangles are bounded by second derivatives alone.
     #[test]
     fn nothing_lies_beyond_its_bounds_at_any_depth() {
         for (layers, depths) in [(MAX_LAYERS, 0..47), (3, 0..19)] {
@@ -189,7 +193,7 @@ mod tests {
         }
     }
 
-    /// How much of its bound the land's largest distance from a triangle is, as far as it is found.
+    /// Returns the largest distance found from a random triangle, as a share of its bound.
     fn found_share(terrain: &Bezier, side_m: f64, turned: bool, dice: &mut fastrand::Rng) -> f64 {
         // Rounding: of the sum of the layers, and of the place where it is steep.
         const ROUNDING_M: f64 = 1e-9;

@@ -1,4 +1,4 @@
-//! Winding passages between rock: a floor and a ceiling of one seed, which belong together.
+//! Winding passages between rock: a floor and a ceiling that match if they have the same seed.
 //!
 //! Passages follow the zero lines of a noise, as crests of ridged noise do; where the noise is large, the ceiling is below
 //! the floor, which [`Cave`](crate::height::cave::Cave) takes for rock.
@@ -16,12 +16,12 @@ const WAVELENGTH: f64 = 90.0;
 const WALL: f64 = 0.22;
 /// Half the height of a passage at its middle, metres.
 const HALF_HEIGHT: f64 = 9.0;
-/// By how much passages rise and fall, metres.
+/// Amplitude of the rise and fall of passages, metres.
 const RELIEF: f64 = 30.0;
-/// Half the height of rocks on the floor, metres; those that hang down are twice as long.
+/// Half the height of rocks on the floor, metres; those on the ceiling are twice as long.
 const ROUGHNESS: f64 = 0.8;
 
-/// See the module.
+/// Makes the floor.
 pub fn floor(size: [u32; 2], seed: u64) -> Field {
     field(size, |p| {
         let (middle, half) = passage(p, seed);
@@ -29,7 +29,7 @@ pub fn floor(size: [u32; 2], seed: u64) -> Field {
     })
 }
 
-/// See the module.
+/// Makes the ceiling.
 pub fn ceiling(size: [u32; 2], seed: u64) -> Field {
     field(size, |p| {
         let (middle, half) = passage(p, seed);

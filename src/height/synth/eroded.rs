@@ -21,10 +21,10 @@ const COARSEST: usize = 160;
 const STEPS: [usize; 2] = [80, 8];
 /// K · dt of a step on the coarsest grid, and on each finer one; with U / K in metres, time needs no unit of its own.
 const PACE: [f64; 2] = [0.4, 0.1];
-/// Height of the lowest land, metres.
+/// Lowest height, metres.
 const BASE: f64 = 400.0;
 
-/// See the module.
+/// Makes an eroded landscape.
 pub fn eroded(size: [u32; 2], seed: u64) -> Field {
     // Rivers leave over the border of the grid: a margin keeps its fixed heights out of the picture.
     let margin = size.map(|n| (n as usize / 8).max(8));
@@ -43,7 +43,7 @@ pub fn eroded(size: [u32; 2], seed: u64) -> Field {
     Field::new(samples, size, [SPACING; 2], Holes::none(w * h))
 }
 
-/// What the ground is like at each place.
+/// The rock: uplift, firmness and repose at each position.
 pub struct Rock {
     /// Seed of all noise.
     pub seed: u64,
@@ -58,7 +58,7 @@ impl Rock {
         [(self.origin[0] + i) / wavelength, (self.origin[1] + j) / wavelength]
     }
 
-    /// Where the massifs are: a warped place on the ridged sum.
+    /// Returns the height of massifs: the ridged noise at a warped position.
     fn massif(&self, grid: Grid, k: usize, octaves: u32) -> f64 {
         let p = noise::warped(self.place(grid, k, 15_000.0), 0.4, self.seed ^ 0x10);
         noise::ridged(p, octaves, self.seed ^ 0x20)
@@ -71,7 +71,7 @@ impl Rock {
         (14.0 + 480.0 * crest * crest * crest) * hardness
     }
 
-    /// How firm the rock is, about −1 to 1.
+    /// Returns the firmness of the rock, about −1 to 1.
     fn firmness(&self, grid: Grid, k: usize) -> f64 {
         noise::fractal(self.place(grid, k, 1_500.0), 3, self.seed ^ 0x40)
     }
@@ -83,7 +83,7 @@ impl Rock {
         (1.05 + 0.25 * bed + 0.4 * firmness).clamp(0.55, 1.7)
     }
 
-    /// The land cut by rivers, coarse grids first.
+    /// Returns the heights of terrain cut by rivers, coarse grids first.
     fn grow(&self, grid: Grid) -> Vec<f64> {
         let finer = usize::from(grid.size[0].max(grid.size[1]) > COARSEST);
         let mut height = match finer {

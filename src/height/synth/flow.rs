@@ -1,4 +1,4 @@
-//! Where water runs: an order in which every cell comes after those it drains to, and the area drained.
+//! Drainage of a grid: an order in which every cell comes after those it drains to, and the area drained.
 //!
 //! Barnes, Lehman and Mulla, "Priority-Flood" (2014), gives the order, the level of lakes and a way out of each;
 //! Freeman, "Calculating catchment area with divergent flow based on a regular grid" (1991), spreads the flow over
@@ -39,13 +39,13 @@ impl Grid {
         self.size[0] * self.size[1]
     }
 
-    /// Whether cell `k` lies on the border, where water leaves.
+    /// Returns true if cell `k` lies on the border, where water leaves.
     pub fn is_border(&self, k: usize) -> bool {
         let (i, j) = (k % self.size[0], k / self.size[0]);
         i == 0 || j == 0 || i + 1 == self.size[0] || j + 1 == self.size[1]
     }
 
-    /// A value of each cell; on all cores, as none depends on another.
+    /// Computes a value for each cell, in parallel.
     pub fn map(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> Vec<f64> {
         (0..self.cells()).into_par_iter().map(value).collect()
     }
@@ -70,13 +70,13 @@ impl Grid {
     }
 }
 
-/// The ways of water over a grid of heights.
+/// Drainage over a grid of heights.
 pub struct Flow {
     /// All cells, each after every cell it drains to.
     pub order: Vec<u32>,
     /// Height of the water: the ground's, or that of the lake over it.
     pub level: Vec<f64>,
-    /// The cell whence the flood reached each cell: its way out of a lake.
+    /// The cell from which the flood reached each cell: its outlet from a lake.
     parent: Vec<u32>,
 }
 

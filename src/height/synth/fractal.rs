@@ -1,4 +1,4 @@
-//! Warped multifractal land: rough on the heights and smooth in the valleys, without rivers.
+//! Warped multifractal terrain: rough on the heights and smooth in the valleys, without rivers.
 //!
 //! Musgrave's "ridged multifractal" in Ebert et al., "Texturing & Modeling" (2003): the detail of each octave is
 //! weighted by the octave before it; the place is warped first, after Quílez, "Domain warping" (2002).
@@ -12,12 +12,12 @@ use crate::height::{Field, Holes, Samples};
 const SPACING: f64 = 20.0;
 /// Wavelength of the first octave, metres.
 const WAVELENGTH: f64 = 9000.0;
-/// Down to about two samples.
+/// Octaves, down to a wavelength of about two samples.
 const OCTAVES: u64 = 9;
 /// Height of the highest crests, metres.
 const RELIEF: f64 = 2400.0;
 
-/// See the module.
+/// Makes a fractal landscape.
 pub fn fractal(size: [u32; 2], seed: u64) -> Field {
     let [w, h] = size.map(u64::from);
     let place = |k: u64| [(k % w) as f64, (k / w) as f64].map(|t| t * SPACING / WAVELENGTH);

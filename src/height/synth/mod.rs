@@ -1,5 +1,5 @@
-//! Height fields from a formula. The same seed gives the same bytes on every machine: only integer hashing and
-//! + − × ÷ sqrt floor of f64 in a written order, and threads only where no value depends on another.
+//! Synthetic height fields. The same seed gives the same bytes on every machine: they use integer hashing and
+//! + − × ÷ sqrt floor of f64 in a fixed order, and threads only where no value depends on another.
 
 mod cave;
 mod eroded;
@@ -43,13 +43,13 @@ pub enum Kind {
     CaveCeiling,
 }
 
-/// One line of [`KINDS`].
+/// One row of [`KINDS`].
 pub struct Entry {
     /// The kind.
     pub kind: Kind,
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// Description in one sentence.
     pub about: &'static str,
     make: fn(size: [u32; 2], seed: u64) -> Field,
 }
@@ -70,7 +70,7 @@ pub const KINDS: &[Entry] = &[
     Entry { kind: Kind::CaveCeiling, name: "cave-ceiling", about: "the ceiling over the cave-floor of the same seed, below it in the rock", make: cave::ceiling },
 ];
 
-/// The field of a kind, `size` samples along (x, z), at least 2 × 2.
+/// Makes the field of a kind, `size` samples along (x, z), at least 2 × 2.
 pub fn synth(kind: Kind, size: [u32; 2], seed: u64) -> Field {
     (KINDS[kind as usize].make)(size, seed)
 }

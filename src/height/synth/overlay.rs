@@ -1,5 +1,5 @@
-//! Colours for bare heights: water, meadow, forest, scree, rock and snow, each where height, slope, hollows and
-//! water put it. No light is baked in.
+//! Colours for heights: water, meadow, forest, scree, rock and snow, by height, slope, hollows and drainage. No light is
+//! baked in.
 
 use image::{Rgb, RgbImage};
 
@@ -33,15 +33,15 @@ pub fn overlay(field: &Field) -> RgbImage {
     })
 }
 
-/// What the colours depend on, one of each a sample.
+/// Quantities that decide the colours, one of each per sample.
 struct Ground {
     grid: Grid,
     /// 0 at the lowest sample, 1 at the highest.
     rise: Vec<f64>,
     slope: Vec<f64>,
-    /// How far a sample faces north, −1 to 1.
+    /// North component of a sample's direction, −1 to 1.
     north: Vec<f64>,
-    /// Depth below the land some 150 m around, metres.
+    /// Depth below the mean of some 150 m around, metres.
     hollow: Vec<f64>,
     /// √(area drained), metres.
     river: Vec<f64>,

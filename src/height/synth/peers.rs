@@ -12,7 +12,7 @@ const OCTAVES: u64 = 10;
 /// Height of the largest code, metres, at 1 m between samples.
 const RELIEF: f32 = 400.0;
 
-/// See the module.
+/// Makes a crop of the landscape.
 pub fn peers(size: [u32; 2], seed: u64) -> Field {
     let place = |k: u64| [(k % u64::from(size[0])) as f64, (k / u64::from(size[0])) as f64];
     let code = |k| (height(place(k), seed) * 65535.0 + 0.5).floor() as u16;

@@ -1,4 +1,4 @@
-//! Fields that are known in advance: planes, and the extremes that break careless renderers.
+//! Fields with known heights: planes, and extreme ones that break careless renderers.
 
 use super::noise;
 use crate::height::{Field, Holes, Samples};
@@ -13,17 +13,17 @@ fn field(size: [u32; 2], height: impl Fn(u32, u32) -> f32) -> Field {
     Field::new(samples, size, [SPACING; 2], holes)
 }
 
-/// Not at 0, so that a height that gets lost shows.
+/// Makes a horizontal plane; not at 0, so that a lost height shows.
 pub fn flat(size: [u32; 2], _: u64) -> Field {
     field(size, |_, _| 100.0)
 }
 
-/// Steps of 1 and 1/2 m are exact, so that any interpolation of it must be.
+/// Makes a ramp. Its steps of 1 and 1/2 m are exact, and so is any interpolation of it.
 pub fn ramp(size: [u32; 2], _: u64) -> Field {
     field(size, |i, j| i as f32 + j as f32 * 0.5)
 }
 
-/// The largest steps that 16 bits hold, between all neighbours.
+/// Makes a checkerboard with the largest steps that 16 bits hold between all neighbours.
 pub fn checker([w, h]: [u32; 2], _: u64) -> Field {
     let heights = (0..h).flat_map(|j| (0..w).map(move |i| if (i + j) % 2 == 0 { i16::MIN } else { i16::MAX }));
     let samples = Samples::from_i16(heights);
@@ -31,13 +31,13 @@ pub fn checker([w, h]: [u32; 2], _: u64) -> Field {
     Field::new(samples, [w, h], [SPACING; 2], holes)
 }
 
-/// Aslant, one column each three rows, so that it crosses the edges of blocks.
+/// Makes a cliff that moves by one column every three rows, so that it crosses the edges of blocks.
 pub fn cliff(size: [u32; 2], _: u64) -> Field {
     let foot = |j: u32| i64::from(size[0] / 2) + (i64::from(j) - i64::from(size[1] / 2)) / 3;
     field(size, |i, j| if i64::from(i) < foot(j) { 0.0 } else { 1000.0 })
 }
 
-/// The place lies inside where there is an inside.
+/// Makes a spike of one sample, away from the border where the size allows.
 pub fn spike(size: [u32; 2], seed: u64) -> Field {
     let [x, z] = [0, 1].map(|axis| match size[axis] {
         2 => noise::hash(axis as i64, 0, seed) % 2,
@@ -46,7 +46,7 @@ pub fn spike(size: [u32; 2], seed: u64) -> Field {
     field(size, |i, j| if (i, j) == (x, z) { 1e5 } else { 0.0 })
 }
 
-/// One sample each row, one column further each two rows.
+/// Makes a ridge of one sample per row that moves by one column every two rows.
 pub fn ridge(size: [u32; 2], _: u64) -> Field {
     field(size, |i, j| if i == (size[0] / 4 + j / 2) % size[0] { 300.0 } else { 0.0 })
 }

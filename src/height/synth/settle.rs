@@ -1,4 +1,4 @@
-//! What ice, soil and rubble do to land cut by rivers: troughs with flat floors, rounded lowlands, plains and lakes.
+//! Effects of ice, soil and rubble on terrain cut by rivers: troughs with flat floors, rounded lowlands, plains and lakes.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,13 +9,13 @@ use super::noise;
 
 /// Half width of a trough over √(area drained).
 const WIDTH: f64 = 0.055;
-/// A trough's walls end at so many half widths.
+/// Distance at which a trough's walls end, half widths.
 const WALLS: f64 = 1.6;
 /// Slope of a plain of rubble.
 const PLAIN: f64 = 0.004;
 
-/// Widens the valleys, rounds the slopes, then lets the land sag twice: what sank first is filled with rubble, what
-/// sank last with water.
+/// Widens the valleys and rounds the slopes. Then the terrain sags twice: the first basins fill with rubble, the last
+/// ones with water.
 pub fn settle(rock: &Rock, grid: Grid, height: &mut Vec<f64>) {
     widen(rock, grid, height);
     (0..6).for_each(|_| creep(grid, height));
@@ -27,8 +27,8 @@ pub fn settle(rock: &Rock, grid: Grid, height: &mut Vec<f64>) {
     *height = Flow::new(grid, height, 0.0).level;
 }
 
-/// Lets the land near a large river down towards it, as glaciers did: the larger the river, the wider. The river that
-/// is nearest in half widths rules a cell; the search spreads from the rivers as Dijkstra's does.
+/// Lowers the terrain beside large rivers towards them, as glaciers did: the larger the river, the wider the trough. The
+/// river nearest in half widths decides for a cell; the search spreads from the rivers like Dijkstra's.
 fn widen(rock: &Rock, grid: Grid, height: &mut [f64]) {
     let area = Flow::new(grid, height, 0.0).area(grid);
     let half_width = |k: usize| {
@@ -51,7 +51,7 @@ fn widen(rock: &Rock, grid: Grid, height: &mut [f64]) {
             let away = grid.distance(n, river) / half_width;
             if away < nearest[n].0.min(WALLS) {
                 nearest[n] = (away, river);
-                // Bits of a non-negative number order as it does.
+                // The bits of non-negative floats sort like the floats.
                 front.push((Reverse(away.to_bits()), n));
             }
         }
@@ -92,7 +92,7 @@ fn roughen(rock: &Rock, grid: Grid, height: &mut [f64]) {
     }
 }
 
-/// Lowers the land in wide basins of up to `depth` metres.
+/// Lowers the terrain in wide basins of up to `depth` metres.
 fn sag(rock: &Rock, grid: Grid, height: &mut [f64], depth: f64, seed: u64) {
     for (k, h) in height.iter_mut().enumerate() {
         *h -= depth * noise::fractal(rock.place(grid, k, 9_000.0), 2, seed).max(0.0);

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{extended, facing_up};
 use crate::height::surface::{self, Corner, Triangle};
-use crate::height::{Field, Holes, Samples};
+use crate::height::{Block, Field, Holes, Samples};
 
 /// Most cells along a side of a greedy mesh.
 pub const TILE: u32 = 1024;
@@ -141,9 +141,8 @@ impl Tile<'_> {
     /// The samples as a field of their own, without holes.
     fn filled(&self) -> Field {
         let size = [0, 1].map(|k| self.last[k] - self.first[k] + 1);
-        let heights = (self.first[1]..=self.last[1])
-            .flat_map(|z| (self.first[0]..=self.last[0]).map(move |x| self.field.height(x, z)))
-            .collect();
+        let mut heights = Vec::new();
+        self.field.read(&Block { first: self.first, last: self.last, step: 1 }, &mut heights);
         let holes = Holes::none((size[0] * size[1]) as usize);
         Field::new(Samples::F32(heights), size, self.field.spacing, holes)
     }
