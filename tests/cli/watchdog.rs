@@ -1,4 +1,4 @@
-//! No command of README's list runs longer than its bound, whatever the field: what never ends is found here.
+//! No command of the guide runs longer than its bound, whatever the field: what never ends is found here.
 
 use std::collections::BTreeSet;
 use std::process::Stdio;
@@ -14,7 +14,7 @@ use super::*;
 /// Seconds for a command on a field of the stress suite: each takes a few at most on a machine with other work.
 const BOUND_S: u64 = 120;
 
-/// README's commands on a field, small ones: the number of frames and pixels is not what could make them run for ever. `T`
+/// The guide's commands on a field, small ones: the number of frames and pixels is not what could make them run for ever. `T`
 /// stands for a technique. Those after the first three need a device.
 const COMMANDS: &[&[&str]] = &[
     &["info", "F"],
@@ -47,7 +47,7 @@ const COMMANDS: &[&[&str]] = &[
 ];
 /// As many of them go without a device.
 const WITHOUT_A_DEVICE: usize = 3;
-/// README's commands that the list leaves out: a window, which has tests of its own, what reads no field, and the stress
+/// Commands of the guide that the list leaves out: a window, which has tests of its own, what reads no field, and the stress
 /// suite itself.
 const ELSEWHERE: [&str; 3] = ["view", "synth", "stress"];
 
@@ -71,9 +71,9 @@ fn watched(folder: &Path, arguments: &[&str]) -> Result<i32, String> {
 }
 
 #[test]
-fn every_subcommand_of_readme_is_watched() {
-    let readme = include_str!("../../README.md");
-    let listed: BTreeSet<_> = readme
+fn every_subcommand_of_the_guide_is_watched() {
+    let guide = include_str!("../../docs/guide.md");
+    let listed: BTreeSet<_> = guide
         .lines()
         .filter_map(|line| line.strip_prefix("cuesta ")?.split_whitespace().next())
         .filter(|name| !ELSEWHERE.contains(name))

@@ -1,22 +1,29 @@
-//! The README says what the tables say.
+//! README and the guide list the same techniques, settings and subcommands as the tables.
 
 use cuesta::lod::TECHNIQUES;
 
 const README: &str = include_str!("../../README.md");
+const GUIDE: &str = include_str!("../../docs/guide.md");
 
-/// The rows of the README's table of techniques: name, and the rest.
-fn rows() -> Vec<(String, String)> {
-    let table = README.split("## Techniques").nth(1).and_then(|rest| rest.split("\n\n").nth(1)).expect("a table");
+/// Returns the rows of a document's table with this header: name, and the other cells.
+fn rows(document: &str, header: &str) -> Vec<(String, String)> {
+    let lines = document.lines().skip_while(|line| !line.starts_with(header)).skip(2);
     let row = |line: &str| {
         let (name, rest) = line.trim_start_matches("| ").split_once('|').expect("cells");
         (name.trim().trim_matches('`').to_string(), rest.to_string())
     };
-    table.lines().skip(2).map(row).collect()
+    lines.take_while(|line| line.starts_with('|')).map(row).collect()
+}
+
+#[test]
+fn readme_lists_every_technique() {
+    let names: Vec<_> = rows(README, "| technique | published by").into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names, TECHNIQUES.iter().map(|entry| entry.name).collect::<Vec<_>>());
 }
 
 #[test]
 fn every_technique_variant_and_setting_is_named_and_no_other() {
-    let rows = rows();
+    let rows = rows(GUIDE, "| technique | variants");
     assert_eq!(rows.len(), TECHNIQUES.len());
     for (entry, (name, rest)) in TECHNIQUES.iter().zip(rows) {
         assert_eq!(entry.name, name);
@@ -30,6 +37,6 @@ fn every_technique_variant_and_setting_is_named_and_no_other() {
 #[test]
 fn every_subcommand_is_shown() {
     for command in cuesta::cli::command().get_subcommands() {
-        assert!(README.contains(&format!("cuesta {}", command.get_name())), "{}", command.get_name());
+        assert!(GUIDE.contains(&format!("cuesta {}", command.get_name())), "{}", command.get_name());
     }
 }
