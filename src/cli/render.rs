@@ -192,8 +192,8 @@ fn measure(scene: &Scene, technique: &dyn Technique, view: &View, rendered: &Ren
     let holes = Truth::new(scene, view)?.hole_pixels(scene, view, &rendered.picture)?;
     let (width, frame) = (view.size[0] as usize, Frame::placing(scene.field, view));
     Ok(Measured {
-        error_px: errors.screen_px.into(),
-        error_m: errors.vertical_m.into(),
+        error_px: errors.screen_px,
+        error_m: errors.vertical_m,
         hole_pixels: holes.len(),
         hole_pixels_at: holes.iter().take(8).map(|k| [k % width, k / width]).collect(),
         skirt_pixels: skirts(&rendered.picture).into_iter().filter(|&is| is).count(),

@@ -56,7 +56,7 @@ const MUTANTS: &[Mutant] = &[
     ("same view, same list", "a counter", "differ", "131 × 67", |field| {
         in_another_view(field, every_other_time_coarser)
     }),
-    ("teleport and return, same list", "a persistent coarser level", "after a journey", "131 × 67", |field| {
+    ("teleport and return, same list", "a persistent coarser level", "after teleport and return", "131 × 67", |field| {
         in_another_view(field, coarser_since_far_away)
     }),
     ("lists fit the limits", "an instance too many", "exceeds", "ramp", |field| changed(field, one_instance_too_many)),
@@ -66,7 +66,7 @@ const MUTANTS: &[Mutant] = &[
     ("a wider tolerance never draws more", "the inverse tolerance", "triangles by tolerance", "131 × 67", |field| {
         in_another_view(field, |view, _| views::with_tolerance(view, 1.0 / view.tolerance.px))
     }),
-    ("holes stay holes", "holes drawn", "nothing but holes", "holes", |field| Blocks::boxed(field, true, &[0])),
+    ("holes stay holes", "holes drawn", "only holes in", "holes", |field| Blocks::boxed(field, true, &[0])),
     ("neighbours within one level", "a jump of two levels", "meet", "noise", |field| {
         Blocks::boxed(field, true, &[0, 2])
     }),
