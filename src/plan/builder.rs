@@ -4,7 +4,7 @@ use super::{Colour, DeviceLimits, Look, ScenePlan, page_shift};
 use crate::draw::PipelineRequirements;
 use crate::height::{Field, Samples};
 use crate::texture::virtual_ground::VirtualGroundLayout;
-use crate::texture::virtual_overlay::VirtualTextureLayout;
+use crate::texture::virtual_layout::VirtualTextureLayout;
 
 /// The inputs of a [`ScenePlan`]: see [`ScenePlan::builder`].
 #[derive(Clone, Copy, Debug)]

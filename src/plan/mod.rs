@@ -12,7 +12,7 @@ mod look;
 use crate::draw::{DepthMode, DrawKinds, Morph, PipelineRequirements, Seams};
 use crate::texture::drape::Drape;
 use crate::texture::virtual_ground::VirtualGroundLayout;
-use crate::texture::virtual_overlay::VirtualTextureLayout;
+use crate::texture::virtual_layout::VirtualTextureLayout;
 pub use builder::ScenePlanBuilder;
 pub use colour::Colour;
 pub use constants::SceneConstants;

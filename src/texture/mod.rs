@@ -16,6 +16,7 @@ pub mod pieces;
 pub mod resolution;
 pub mod tile_cache;
 pub mod virtual_ground;
+pub mod virtual_layout;
 pub mod virtual_overlay;
 pub mod wedges;
 pub mod working_set;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::drape::Drape;
-use super::virtual_overlay::VirtualTextureLayout;
+use super::virtual_layout::VirtualTextureLayout;
 use crate::height::Field;
 use crate::height::bounds::{Bounds, Measure};
 use crate::height::progress::Progress;

@@ -19,11 +19,14 @@ use glam::Vec4;
 
 use super::layout::{CERTIFIED, ClusterView, DISTANCE, EVEN, PAPER};
 use super::morph_ranges::{MorphRanges, NODE_END};
-use super::skirts::RASTER_PX;
 use super::tree::{Node, Squares, Tree};
 use crate::draw::layout::RenderOrigin;
 use crate::height::bounds::Square;
 use crate::view::{Containment, Lens, Metric, View};
+
+/// Maximum visible gap between coinciding edges after rasterisation, pixels: vertices are rounded to 1/256 of a pixel,
+/// and a skirt may be seen from almost above.
+const RASTER_PX: f64 = 0.125;
 
 /// Factor on error margins, so that rounding never allows more than [`crate::view::Allowance::error`].
 const GUARD: f32 = 1.0 - 1.0 / 16384.0;

@@ -10,8 +10,6 @@
 use super::tree::Tree;
 use crate::draw::distance::{MORPH_END, weights};
 use crate::draw::weights::DistanceWeights;
-use crate::height::bounds::{Bounds, ROUNDING};
-use crate::height::{Field, level_errors};
 use crate::view::{Lens, Metric, View};
 
 /// Factor above the rounding error of distances in single precision.
@@ -26,21 +24,6 @@ pub const NODE_END: f32 = MORPH_END * 1.0001;
 
 /// Maximum distance, metres.
 const FARTHEST_M: f64 = 1e12;
-
-/// Returns the maximum error while blocks morph into each level, metres.
-pub fn errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
-    let (errors, displacements) =
-        (level_errors::largest_errors(bounds), level_errors::largest_displacements(field, bounds));
-    let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
-    let rounding = ROUNDING * low.abs().max(high.abs());
-    let error = |level: usize| match level {
-        0 => 0.0,
-        // Sides of level 0 on edges of level 1 deviate as far as that level's vertices move.
-        1 => errors[1].max(displacements[1] + displacements[1]) + rounding,
-        _ => errors[level].max(errors[level - 1] + displacements[level]) + rounding,
-    };
-    (0..errors.len()).map(error).collect()
-}
 
 /// Distances of the morphs into all levels in a view.
 #[derive(Clone, Copy, Debug, Default)]

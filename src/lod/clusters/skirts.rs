@@ -16,10 +16,6 @@ use super::refine::Refinement;
 use super::tree::{Node, SIDES};
 use crate::draw::weights::{FINER, ONE, SkirtWeights};
 
-/// Maximum visible gap between coinciding edges after rasterisation, pixels: vertices are rounded to 1/256 of a pixel,
-/// and a skirt may be seen from almost above.
-pub const RASTER_PX: f64 = 0.125;
-
 /// Rounding of morphed heights, as in `height::bounds`.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 

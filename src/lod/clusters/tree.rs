@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
-use super::morph_ranges;
-use crate::height::Field;
-use crate::height::bounds::{Bounds, Measure, Square};
+use crate::height::bounds::{Bounds, Measure, ROUNDING, Square};
 use crate::height::progress::Progress;
+use crate::height::{Field, level_errors};
 
 /// A square of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +66,7 @@ pub enum Errors {
     /// Measured against the samples.
     Measured,
     /// One error per level, metres: measured against the samples, including the morph into the level
-    /// ([`morph_ranges`]).
+    /// ([`super::morph_ranges`]).
     ByLevel(Vec<f32>),
     /// Judnich & Ling 2012, eq. 2: half the parent's error. The root's is the range of heights, metres.
     Halved(f32),
@@ -112,7 +111,7 @@ impl Tree {
         let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
         let errors = match (measure.errors, by_level) {
             (false, _) => Errors::Halved((high - low).max(0.0)),
-            (true, true) => Errors::ByLevel(morph_ranges::errors(field, &bounds)),
+            (true, true) => Errors::ByLevel(morph_errors(field, &bounds)),
             (true, false) => Errors::Measured,
         };
         let last = field.size().map(|n| n - 1);
@@ -199,4 +198,19 @@ impl Tree {
             Errors::Halved(root) => root / (1u64 << (self.root().level - level)) as f32,
         }
     }
+}
+
+/// Returns the maximum error while blocks morph into each level, metres.
+fn morph_errors(field: &Field, bounds: &Bounds) -> Vec<f32> {
+    let (errors, displacements) =
+        (level_errors::largest_errors(bounds), level_errors::largest_displacements(field, bounds));
+    let [low, high] = bounds.square(bounds.levels() - 1, [0, 0]).range;
+    let rounding = ROUNDING * low.abs().max(high.abs());
+    let error = |level: usize| match level {
+        0 => 0.0,
+        // Sides of level 0 on edges of level 1 deviate as far as that level's vertices move.
+        1 => errors[1].max(displacements[1] + displacements[1]) + rounding,
+        _ => errors[level].max(errors[level - 1] + displacements[level]) + rounding,
+    };
+    (0..errors.len()).map(error).collect()
 }

@@ -35,6 +35,11 @@ impl Pool {
         Self { page, sizes, pages, empty: (0..count).rev().collect(), open }
     }
 
+    /// Returns the number of vertices of a chunk, by level.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
     /// Returns the number of vertices of all pages.
     pub fn vertices(&self) -> usize {
         self.pages.len() * self.page
@@ -60,6 +65,13 @@ impl Pool {
     pub fn vertices_for(sizes: &[usize], chunks: &[usize]) -> usize {
         let page = CHUNKS * sizes[0];
         sizes.iter().zip(chunks).map(|(size, chunks)| (chunks.div_ceil(page / size) + 1) * page).sum()
+    }
+
+    /// Returns the vertices of a buffer that holds these chunks by level. Includes one more page for each of these
+    /// levels, and one page of every level for replaced chunks.
+    pub fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
+        let used = chunks.iter().filter(|&&count| count > 0).count();
+        Self::vertices_for(sizes, chunks) + used * CHUNKS * sizes[0]
     }
 
     /// Returns an upper bound on the vertices of pages for `chunks` chunks of any levels, with two more pages for each

@@ -37,6 +37,8 @@ pub struct Queue {
     left: Budget,
     moves: Vec<Move>,
     changed: Vec<usize>,
+    /// Chunks by level; stored so that frames do not allocate.
+    counts: Vec<usize>,
     /// True if the buffer could not hold a chunk of the last frame.
     is_short: bool,
 }
@@ -53,22 +55,28 @@ impl Queue {
         // Twice the finest level in use, so that all tiles may change in one frame; at least the coarsest level.
         let whole = 2 * Pool::vertices_for(&sizes, &all_at(&[tiles.finest(), top]));
         let whole = whole.max(Pool::max_vertices(&sizes, count));
-        let min = settled_vertices(&sizes, &all_at(&[top]));
+        let counts = Vec::with_capacity(sizes.len());
+        let min = Pool::settled_vertices(&sizes, &all_at(&[top]));
         let mut pool = Pool::new(sizes, whole.min(max_vertices).max(min));
         let first_vertices =
             (0..count).map(|_| pool.take(top, 0).expect("the pool holds the coarsest level")).collect();
         let left = Budget { chunks: 0, vertices: 0 };
         let (levels, moves, changed) = (vec![top; count], Vec::new(), Vec::new());
-        Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed, is_short: false }
+        Self { cells: tiles.cells, levels, first_vertices, pool, left, moves, changed, counts, is_short: false }
     }
 
     /// Returns true if the buffer holds one chunk of these levels for each tile, with spare pages to change between
     /// them.
-    pub fn holds(&self, levels: impl Iterator<Item = u32>) -> bool {
-        let sizes: Vec<_> = (0..=self.cells.ilog2()).map(|level| chunk::vertices(self.cells, level)).collect();
-        let mut chunks = vec![0; sizes.len()];
-        levels.for_each(|level| chunks[level as usize] += 1);
-        settled_vertices(&sizes, &chunks) <= self.vertices()
+    pub fn holds(&mut self, levels: impl Iterator<Item = u32>) -> bool {
+        self.count(levels);
+        Pool::settled_vertices(self.pool.sizes(), &self.counts) <= self.vertices()
+    }
+
+    /// Counts chunks by level into `counts`.
+    fn count(&mut self, levels: impl Iterator<Item = u32>) {
+        self.counts.clear();
+        self.counts.resize(self.pool.sizes().len(), 0);
+        levels.for_each(|level| self.counts[level as usize] += 1);
     }
 
     /// Returns true if the buffer could not hold a chunk of the last frame.
@@ -124,11 +132,10 @@ impl Queue {
     }
 
     /// Returns true if all changes fit into this frame.
-    fn all_fit(&self, changed: &[usize], aims: &[u32]) -> bool {
-        let mut chunks = vec![0; self.cells.ilog2() as usize + 1];
-        changed.iter().for_each(|&tile| chunks[aims[tile] as usize] += 1);
-        let vertices: usize = (0u32..).zip(&chunks).map(|(level, n)| n * chunk::vertices(self.cells, level)).sum();
-        changed.len() <= self.left.chunks && vertices <= self.left.vertices && self.pool.holds(&chunks, 0)
+    fn all_fit(&mut self, changed: &[usize], aims: &[u32]) -> bool {
+        self.count(changed.iter().map(|&tile| aims[tile]));
+        let vertices: usize = self.pool.sizes().iter().zip(&self.counts).map(|(size, n)| size * n).sum();
+        changed.len() <= self.left.chunks && vertices <= self.left.vertices && self.pool.holds(&self.counts, 0)
     }
 
     fn advance_in_turn<U: PartialOrd>(
@@ -138,7 +145,8 @@ impl Queue {
         changed: &mut [usize],
         urgency: impl Fn(usize) -> U,
     ) {
-        changed.sort_by_key(|&tile| aims[tile] > self.levels[tile]);
+        // Tiles are unique, so this order equals that of a stable sort, which would allocate.
+        changed.sort_unstable_by_key(|&tile| (aims[tile] > self.levels[tile], tile));
         let (refining, coarsening) =
             changed.split_at_mut(changed.partition_point(|&tile| aims[tile] < self.levels[tile]));
         refining.sort_unstable_by(|&a, &b| urgency(a).partial_cmp(&urgency(b)).unwrap_or(std::cmp::Ordering::Equal));
@@ -193,12 +201,4 @@ impl Queue {
         self.moves.push(Move { tile, level, first_vertex });
         true
     }
-}
-
-/// Returns the vertices of a buffer that holds these chunks by level. Includes one more page for each of these levels,
-/// and one page of every level for replaced chunks.
-fn settled_vertices(sizes: &[usize], chunks: &[usize]) -> usize {
-    let unused = chunks.iter().filter(|&&count| count == 0).count();
-    let page = Pool::vertices_for(sizes, &vec![0; sizes.len()]) / sizes.len();
-    Pool::vertices_for(sizes, chunks) + (sizes.len() - unused) * page
 }

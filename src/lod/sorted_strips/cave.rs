@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::blend::Blend;
 use super::certified::{Certified, bounds, guarded};
+use super::context::WalkContext;
 use super::footprint::Footprint;
 use super::measure::Errors;
 use super::pages::{Grid, Pages, Row, TraversalDirection};
@@ -26,7 +27,7 @@ use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
 use super::topology;
-use super::walk::{Stream, WalkContext, Worker};
+use super::walk::{Stream, Worker};
 use super::{ENTRY, MAX_PAGES, MAX_TRIANGLES, join_streams};
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,

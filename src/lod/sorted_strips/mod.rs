@@ -40,6 +40,7 @@
 pub mod blend;
 pub mod cave;
 pub mod certified;
+pub mod context;
 pub mod depth_sorter;
 pub mod footprint;
 pub mod measure;
@@ -61,6 +62,7 @@ use rayon::prelude::*;
 use self::blend::Blend;
 use self::cave::CaveStrips;
 use self::certified::{Certified, bounds, guarded};
+use self::context::WalkContext;
 use self::footprint::Footprint;
 use self::measure::Errors;
 use self::pages::{Grid, Pages, Row, TraversalDirection};
@@ -68,7 +70,7 @@ use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
 use self::table::{Radial, eye_height_m};
-use self::walk::{Stream, WalkContext, Worker};
+use self::walk::{Stream, Worker};
 use super::{
     Diagnostics, Entry, Need, SelectInParts, Setting, Settings, Technique, Values, Variant, select_within_limits,
 };

@@ -26,15 +26,70 @@ pub trait Levels: Sync {
     }
 }
 
+/// Bits of all pages, 64 in a word.
+enum Words {
+    /// All words of each page that has a place, page after page.
+    Dense {
+        /// Number of words of a page.
+        per_page: usize,
+        /// The words.
+        words: Vec<u64>,
+    },
+    /// Nonzero words only, by place of the page and index in it.
+    Sparse(HashMap<(u32, usize), u64>),
+}
+
+impl Words {
+    fn new(per_page: usize) -> Self {
+        if per_page > MAX_PAGE_WORDS {
+            Self::Sparse(HashMap::new())
+        } else {
+            Self::Dense { per_page, words: Vec::new() }
+        }
+    }
+
+    fn clear(&mut self) {
+        match self {
+            Self::Dense { words, .. } => words.clear(),
+            Self::Sparse(words) => words.clear(),
+        }
+    }
+
+    /// Allocates page `k` and returns its place.
+    fn place(&mut self, k: usize) -> u32 {
+        match self {
+            Self::Dense { per_page, words } => {
+                words.resize(words.len() + *per_page, 0);
+                (words.len() / *per_page) as u32
+            }
+            Self::Sparse(_) => k as u32 + 1,
+        }
+    }
+
+    /// Returns a word of the page at a place.
+    #[inline]
+    fn get(&self, place: u32, word: usize) -> u64 {
+        match self {
+            Self::Dense { per_page, words } => words[(place as usize - 1) * per_page + word],
+            Self::Sparse(words) => words.get(&(place, word)).copied().unwrap_or(0),
+        }
+    }
+
+    /// Returns the same word, writable.
+    fn get_mut(&mut self, place: u32, word: usize) -> &mut u64 {
+        match self {
+            Self::Dense { per_page, words } => &mut words[(place as usize - 1) * *per_page + word],
+            Self::Sparse(words) => words.entry((place, word)).or_default(),
+        }
+    }
+}
+
 /// A set of split squares.
 pub struct Splits {
     grid: Grid,
-    /// Position of each page's bits in `words`, plus one; 0 if none of them is set.
+    /// Place of each page in `words`, counted from 1; 0 if none of its squares is split.
     places: Vec<u32>,
-    words: Vec<u64>,
-    /// Nonzero words by page and word index, used instead of `words` for large pages.
-    sparse: HashMap<(u32, usize), u64>,
-    words_per_page: usize,
+    words: Words,
     /// First bit in a page, by level.
     first_bits: Vec<usize>,
     /// Split squares by level.
@@ -51,8 +106,7 @@ impl Splits {
         let words_per_page = (first_bits.get(1).copied().unwrap_or(0) + bits(1)).div_ceil(64);
         let pages = (grid.count[0] * grid.count[1]) as usize;
         let lists = vec![Vec::new(); grid.level as usize + 1];
-        let (places, words, sparse) = (vec![0; pages], Vec::new(), HashMap::new());
-        Self { grid, places, words, sparse, words_per_page, first_bits, lists }
+        Self { grid, places: vec![0; pages], words: Words::new(words_per_page), first_bits, lists }
     }
 
     /// Empties the set and keeps its memory.
@@ -65,7 +119,6 @@ impl Splits {
             }
         }
         self.words.clear();
-        self.sparse.clear();
     }
 
     /// Returns the number of split squares.
@@ -87,16 +140,10 @@ impl Splits {
         let page = at.map(|n| n >> (self.grid.level - level));
         let Some(k) = self.grid.index(page).filter(|_| pages.is_drawn(page)) else { return false };
         let (word, bit) = self.bit(level, at);
-        let word = if self.words_per_page > MAX_PAGE_WORDS {
-            self.places[k] = k as u32 + 1;
-            self.sparse.entry((self.places[k], word)).or_default()
-        } else {
-            if self.places[k] == 0 {
-                self.places[k] = (self.words.len() / self.words_per_page) as u32 + 1;
-                self.words.resize(self.words.len() + self.words_per_page, 0);
-            }
-            &mut self.words[(self.places[k] as usize - 1) * self.words_per_page + word]
-        };
+        if self.places[k] == 0 {
+            self.places[k] = self.words.place(k);
+        }
+        let word = self.words.get_mut(self.places[k], word);
         if *word & bit != 0 {
             return false;
         }
@@ -128,12 +175,7 @@ impl Levels for Splits {
             return false;
         }
         let (word, bit) = self.bit(level, at);
-        let word = if self.words_per_page > MAX_PAGE_WORDS {
-            self.sparse.get(&(self.places[k], word)).copied().unwrap_or(0)
-        } else {
-            self.words[(self.places[k] as usize - 1) * self.words_per_page + word]
-        };
-        word & bit != 0
+        self.words.get(self.places[k], word) & bit != 0
     }
 }
 
@@ -183,14 +225,40 @@ mod tests {
     }
 
     #[test]
+    fn sparse_pages_equal_dense_ones() {
+        let pages = everywhere();
+        let mut random = fastrand::Rng::with_seed(7);
+        let (mut dense, mut sparse) =
+            (Splits::new(GRID), Splits { words: Words::new(MAX_PAGE_WORDS + 1), ..Splits::new(GRID) });
+        assert!(matches!((&dense.words, &sparse.words), (Words::Dense { .. }, Words::Sparse(_))));
+        for _ in 0..50 {
+            [&mut dense, &mut sparse].into_iter().for_each(Splits::clear);
+            for _ in 0..random.usize(1..12) {
+                let level = random.u32(1..=4);
+                let at = [0, 1].map(|_| random.i32(0..48 >> level));
+                assert_eq!(dense.insert(&pages, level, at), sparse.insert(&pages, level, at));
+            }
+            [&mut dense, &mut sparse].into_iter().for_each(|splits| splits.close(&pages));
+            assert_eq!(dense.lists, sparse.lists);
+            for level in 0..=4 {
+                let squares = (0..48 >> level).flat_map(|x| (0..48 >> level).map(move |z| [x, z]));
+                let differ = |at: &[i32; 2]| dense.is_split(level, *at) != sparse.is_split(level, *at);
+                assert_eq!(squares.into_iter().find(differ), None, "level {level}");
+            }
+        }
+    }
+
+    #[test]
     fn clear_empties_the_set() {
         let pages = everywhere();
-        let mut splits = Splits::new(GRID);
-        assert!(splits.insert(&pages, 1, [9, 9]) && !splits.insert(&pages, 1, [9, 9]));
-        splits.close(&pages);
-        assert!(splits.is_split(4, [1, 1]) && splits.count() >= 4);
-        splits.clear();
-        assert_eq!(splits.count(), 0);
-        assert!((1..=4).all(|l| !splits.is_split(l, [18 >> l, 18 >> l])));
+        let sparse = Splits { words: Words::new(MAX_PAGE_WORDS + 1), ..Splits::new(GRID) };
+        for mut splits in [Splits::new(GRID), sparse] {
+            assert!(splits.insert(&pages, 1, [9, 9]) && !splits.insert(&pages, 1, [9, 9]));
+            splits.close(&pages);
+            assert!(splits.is_split(4, [1, 1]) && splits.count() >= 4);
+            splits.clear();
+            assert_eq!(splits.count(), 0);
+            assert!((1..=4).all(|l| !splits.is_split(l, [18 >> l, 18 >> l])));
+        }
     }
 }

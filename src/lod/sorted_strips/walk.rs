@@ -27,12 +27,12 @@
 //! vertices are generated again, as the paper copies them from page to page.
 
 use super::blend::Blend;
+use super::context::WalkContext;
 use super::depth_sorter::{Crossing, DepthSorter};
 use super::pages::{Pages, Row, Run, TraversalDirection, placed};
-use super::shapes::{BACK, LEADING, Shape, Shapes, TRAILING, slot};
+use super::shapes::{BACK, LEADING, Shape, TRAILING, slot};
 use super::splits::Levels;
 use crate::draw::ExplicitVertex;
-use crate::height::Field;
 
 /// Vertices and indices of a part of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,22 +64,6 @@ pub struct Worker {
     marks: Vec<Mark>,
     start: Vec<u32>,
     sorter: DepthSorter,
-}
-
-/// Inputs shared by the walks of all rows of a frame.
-pub struct WalkContext<'a, L> {
-    /// Heights.
-    pub field: &'a Field,
-    /// Pages to draw.
-    pub pages: &'a Pages,
-    /// Level function.
-    pub levels: &'a L,
-    /// All kinds of quads.
-    pub shapes: &'a Shapes,
-    /// Position of the eye and direction of the view.
-    pub traversal: TraversalDirection,
-    /// Morph of vertices to the next level.
-    pub blend: Blend,
 }
 
 /// A vertex that is used but not generated yet.

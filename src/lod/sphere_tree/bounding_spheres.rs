@@ -12,8 +12,8 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
+use super::diamond_info::DiamondInfo;
 use super::front::{CrossingTracker, Front, TrackingHandle};
-use super::measure::DiamondInfo;
 use super::reach::Viewpoint;
 
 /// Concentric spheres about one past viewpoint.

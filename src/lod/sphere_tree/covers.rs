@@ -9,8 +9,9 @@
 use glam::DVec3;
 
 use super::bounding_spheres::BoundingSpheres;
-use super::front::{ByIndex, CrossingTracker, Front, TrackingHandle};
-use super::measure::DiamondInfo;
+use super::by_index::ByIndex;
+use super::diamond_info::DiamondInfo;
+use super::front::{CrossingTracker, Front, TrackingHandle};
 use super::reach::Viewpoint;
 
 /// Sample points along the ray in plan, in multiples of the distance to the diamond: beyond one that may split, before

@@ -11,9 +11,9 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use rayon::prelude::*;
 
-use super::front::ByIndex;
+use super::by_index::ByIndex;
+use super::diamond_info::SPARE;
 use super::lattice::{Place, half_length};
-use super::measure::SPARE;
 use crate::height::bezier::{Area, Bezier, SPACING_M};
 use crate::height::bounds::ROUNDING;
 

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::diamond_info::{DiamondInfo, SPARE};
 use super::evaluated::{Evaluated, Size};
 use super::lattice::{Diamond, Lattice, Place};
 use super::reach::Reach;
@@ -18,9 +19,6 @@ use crate::height::bounds::ROUNDING;
 use crate::height::progress::Progress;
 use crate::height::surface::{self, Corner};
 use crate::view::{Tolerance, View};
-
-/// Relative margin of a ball's radius for rounding, far above that of a distance in f64.
-pub const SPARE: f64 = 1e-6;
 
 /// A field with its measured diamonds.
 pub struct Measured {
@@ -39,21 +37,6 @@ pub struct Measured {
     rounding: f32,
     /// Replaces errors and balls for procedural terrain, which has no samples.
     evaluated: Option<Evaluated>,
-}
-
-/// A diamond with its error and ball.
-#[derive(Clone, Copy, Debug)]
-pub struct DiamondInfo {
-    /// Middle on the lattice.
-    pub at: Place,
-    /// Index.
-    pub index: usize,
-    /// Middle relative to the field's first sample, at its height, metres.
-    pub centre: DVec3,
-    /// Largest distance from the terrain, metres.
-    pub error: f32,
-    /// Radius of the ball about the middle, metres.
-    pub ball: f32,
 }
 
 impl Measured {

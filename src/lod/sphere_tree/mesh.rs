@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::blocks::Blocks;
 use super::lattice::{Lattice, Place};
 use super::measure::Measured;
-use super::patches::Patches;
+use super::patches::{Patches, Piece};
 use super::reach::Viewpoint;
 use super::splits::Splits;
 use crate::draw::{Draw, DrawList, ExplicitVertex, Instance, Source, Topology};
@@ -54,15 +54,6 @@ impl Corner {
 
 /// A wedge: the corner with the right angle first, counter-clockwise seen from above.
 pub type Wedge = [Corner; 3];
-
-/// Triangles of one draw.
-#[derive(Default)]
-pub struct Piece {
-    /// Vertices.
-    pub vertices: Vec<ExplicitVertex>,
-    /// Three indices per triangle.
-    pub indices: Vec<u32>,
-}
 
 /// Inputs of the mesh for one viewpoint.
 pub struct Mesh<'a> {

@@ -25,7 +25,9 @@
 
 pub mod blocks;
 pub mod bounding_spheres;
+pub mod by_index;
 pub mod covers;
+pub mod diamond_info;
 pub mod evaluated;
 pub mod front;
 pub mod lattice;

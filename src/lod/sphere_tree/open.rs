@@ -9,7 +9,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::lattice::Place;
-use super::mesh::{Mesh, Piece, Wedge, push};
+use super::mesh::{Mesh, Wedge, push};
+use super::patches::Piece;
 use crate::draw::normals::pack;
 use crate::draw::{DrawList, ExplicitVertex, VertexNormals};
 use crate::height::bezier::{Bezier, SPACING_M};

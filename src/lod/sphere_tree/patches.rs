@@ -28,12 +28,20 @@ use range_alloc::RangeAllocator;
 
 use super::blocks::Blocks;
 use super::lattice::Place;
-use super::mesh::Piece;
 use super::splits::Changes;
 use crate::draw::{ExplicitVertex, Geometry, Limits, Upload};
 
 /// Maximum number of bytes uploaded in a frame. Each frame in flight has a staging buffer of this size.
 const UPLOAD_BYTES: usize = 32 << 20;
+
+/// Triangles of one draw.
+#[derive(Default)]
+pub struct Piece {
+    /// Vertices.
+    pub vertices: Vec<ExplicitVertex>,
+    /// Three indices per triangle.
+    pub indices: Vec<u32>,
+}
 
 /// Triangles of a block on the device.
 struct Patch {

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::measure::DiamondInfo;
+use super::diamond_info::DiamondInfo;
 use crate::view::{Lens, Metric, View};
 
 /// Distances at which errors are tolerated, for one lens, image size and tolerance.

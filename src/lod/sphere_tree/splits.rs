@@ -1,6 +1,6 @@
 //! The set of split diamonds, and its computation by checking every diamond.
 
-use super::front::ByIndex;
+use super::by_index::ByIndex;
 use super::lattice::Place;
 use super::measure::Measured;
 use super::reach::Viewpoint;
