@@ -1,5 +1,5 @@
 //! The program.
 
 fn main() -> std::process::ExitCode {
-    cuesta::cli::main()
+    cuesta::internal::cli::main()
 }
