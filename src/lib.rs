@@ -42,15 +42,20 @@ pub mod measure;
 #[cfg(feature = "vulkan")]
 pub mod scene;
 
+#[cfg(feature = "bench")]
 pub mod bench;
 
+#[cfg(feature = "bench")]
 pub mod profile;
 
+#[cfg(feature = "bench")]
 pub mod stress;
 
+#[cfg(feature = "bench")]
 pub mod report;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;
 
+#[cfg(feature = "cli")]
 pub mod cli;
