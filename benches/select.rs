@@ -1,5 +1,5 @@
 //! How long each technique takes to select what is drawn, without a device:
-//! `cargo bench --no-default-features -- FILE [technique[:variant] …]`.
+//! `cargo bench --no-default-features --features bench -- FILE [technique[:variant] …]`.
 //!
 //! Every frame of a path is selected once to warm up and then several times. In between other memory is read, as a frame
 //! is drawn in between: caches are cold.

@@ -4,7 +4,7 @@
 //! ROAM stands here twice: its priorities wait for the way that the viewpoint has really gone, which is the best that
 //! they can, and for that at the largest speed it may have, as published: here the fast path's.
 //! And what is selected and sent for a frame where triangles are streamed, and where blocks are kept on the device.
-//! `cargo bench --no-default-features --bench spheres`, while nothing else runs; with `-- 100000 leaping` that alone.
+//! `cargo bench --no-default-features --features bench --bench spheres`, while nothing else runs; with `-- 100000 leaping` that alone.
 
 use std::hint::black_box;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Figure 5 of Finch & Bishop 1998 again: time to make a frame's triangles against their number, without rendering.
 //!
 //! Their scene: 8 × 8 pages of 64 × 64 cells tiled over the plane, a circle flown low above ground, one level scale a
-//! series. `cargo bench --no-default-features --bench strips`, while nothing else runs.
+//! series. `cargo bench --no-default-features --features bench --bench strips`, while nothing else runs.
 
 use std::sync::Arc;
 use std::time::Instant;

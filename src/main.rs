@@ -1,5 +1,7 @@
-//! The program.
+//! The program `cuesta`.
+
+use cuesta::lod::Techniques;
 
 fn main() -> std::process::ExitCode {
-    cuesta::cli::main()
+    cuesta::cli::main(&Techniques::built_in())
 }

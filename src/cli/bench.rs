@@ -16,6 +16,7 @@ use crate::bench::results::{CaseResult, RESULTS, Results};
 use crate::bench::rows::{Header, Machine};
 use crate::bench::run::{Ended, Run};
 use crate::bench::{BenchBackend, SCHEMA};
+use crate::lod::TechniqueSpec;
 use crate::plan::Look;
 
 /// Arguments.
@@ -63,7 +64,7 @@ pub struct MeasureArgs {
     pub out: Option<PathBuf>,
     /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
-    pub technique: Vec<String>,
+    pub technique: Vec<TechniqueSpec>,
     /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
     #[arg(long = "set", value_name = "KEY=V,…", value_parser = super::scene::key_value)]
     pub settings: Vec<(String, String)>,
@@ -135,7 +136,7 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
 #[cfg(feature = "vulkan")]
 fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
     let gpu = super::render::open(common, false)?;
-    Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look)))
+    Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look, common.techniques.clone())))
 }
 
 #[cfg(not(feature = "vulkan"))]

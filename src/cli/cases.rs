@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Result, anyhow, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use clap::ValueEnum;
 
 use super::bench::MeasureArgs;
-use super::{Common, endless, report};
+use super::{Common, endless, report, technique};
 use crate::bench::goal::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
-use crate::lod;
+use crate::lod::TechniqueSpec;
 
 /// Frames drawn before a path begins.
 const WARM_UP: usize = 5;
@@ -102,36 +102,29 @@ impl Planned {
 
 /// The techniques asked for, checked; all of the table unless some are named.
 fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
-    let all: Vec<String> = lod::TECHNIQUES.iter().map(|entry| entry.name.to_string()).collect();
-    let names = if args.technique.is_empty() { &all } else { &args.technique };
-    for (key, _) in &args.settings {
-        let has = |name: &String| entry(name).is_ok_and(|(entry, _)| entry.settings.iter().any(|s| s.key == key));
-        ensure!(names.iter().any(has), "--set {key}: no technique of this run has this setting");
+    let mut specs = args.technique.clone();
+    if specs.is_empty() {
+        specs = common.techniques.specs().into_iter().filter(|spec| spec.variant.is_none()).collect();
     }
-    Ok(names.iter().map(|name| asked(common, name, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
-}
-
-fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
-    let (technique, variant) = name.split_once(':').map_or((name, None), |(t, v)| (t, Some(v)));
-    let entry = lod::find(technique).ok_or_else(|| {
-        let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
-        anyhow!("--technique {technique}: expected one of {}", known.join(", "))
-    })?;
-    Ok((entry, variant))
+    for (key, _) in &args.settings {
+        let has = |spec| common.techniques.entry(spec).is_ok_and(|entry| entry.settings.iter().any(|s| s.key == key));
+        ensure!(specs.iter().any(has), "--set {key}: no technique of this run has this setting");
+    }
+    Ok(specs.iter().map(|spec| asked(common, spec, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// A technique once with each combination of the values of its settings.
-fn asked(common: &Common, name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
-    let (entry, variant) = entry(name)?;
+fn asked(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) -> Result<Vec<Asked>> {
+    let entry = technique::entry(&common.techniques, spec)?;
     let mut all = vec![Vec::new()];
     for (key, values) in choices.iter().filter(|(key, _)| entry.settings.iter().any(|setting| setting.key == key)) {
         let with = |own: &Vec<(String, String)>, value: &str| [&own[..], &[(key.clone(), value.to_string())]].concat();
         all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
     }
     let checked = |own: Vec<(String, String)>| {
-        let settings = super::technique::settings(entry, variant, &own)?;
+        let settings = technique::settings(entry, spec.variant.as_deref(), &own)?;
         report::warn_of_idle(common, entry, &settings);
-        Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
+        Ok(Asked { technique: spec.to_string(), settings: own.into_iter().collect() })
     };
     all.into_iter().map(checked).collect()
 }
@@ -244,10 +237,11 @@ fn goals(args: &MeasureArgs) -> Vec<Goal> {
 /// The choices of a run, whatever order and form they were given in.
 fn arguments(args: &MeasureArgs) -> Vec<String> {
     let joined = |values: &[String]| values.join(",");
+    let specs: Vec<_> = args.technique.iter().map(TechniqueSpec::to_string).collect();
     let tolerances: Vec<_> = args.tolerance.iter().map(f64::to_string).collect();
     let settings: Vec<_> = args.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
     let mut list = args.terrain.clone();
-    let techniques = if args.technique.is_empty() { "all".to_string() } else { joined(&args.technique) };
+    let techniques = if specs.is_empty() { "all".to_string() } else { joined(&specs) };
     let metric = format!("{:?}", args.metric).to_lowercase();
     list.push(format!("--technique {techniques} --tolerance {} --metric {metric}", joined(&tolerances)));
     if !settings.is_empty() {

@@ -75,7 +75,7 @@ struct Figure {
 pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> Result<Outcome> {
     let field = &Arc::new(loaded.field);
     let (look, overlay) = args.look.build(common, terrain, (field, &loaded.footprint))?;
-    let (entry, _) = args.technique.settings()?;
+    let (entry, _) = args.technique.settings(&common.techniques)?;
     let technique = args.technique.build(common, field)?;
     let (plan, savings) = plan(common, args, (field, &look, overlay.as_ref()), technique.as_ref())?;
     let (kept, left_out) = plan.decisions(field, Some(&technique.device_geometry()));

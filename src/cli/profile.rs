@@ -99,7 +99,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
         schema: rows::SCHEMA,
         program: format!("cuesta {}", env!("CARGO_PKG_VERSION")),
         terrain: args.terrain.name(),
-        technique: args.technique.technique.clone(),
+        technique: args.technique.technique.to_string(),
         metric: args.technique.metric.name(),
         tolerance_px: view.tolerance.px,
         size: view.size,
@@ -122,7 +122,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
 
 /// The technique as it was asked for, and then its other forms under the same settings.
 fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<Form>> {
-    let (entry, chosen) = args.technique.settings()?;
+    let (entry, chosen) = args.technique.settings(&common.techniques)?;
     report::warn_of_idle(common, entry, &chosen);
     let variants = std::iter::once(None).chain(entry.variants.iter().map(|variant| Some(variant.name)));
     let mut variants: Vec<_> = variants.collect();

@@ -165,7 +165,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         over || m.hole_pixels > 0 || !m.watertight
     });
     let rendered = Rendered {
-        technique: args.technique.technique.clone(),
+        technique: args.technique.technique.to_string(),
         metric: if view.tolerance.metric == Metric::Certified { "certified" } else { "paper" },
         tolerance_px: view.tolerance.px,
         size: view.size,

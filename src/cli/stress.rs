@@ -43,7 +43,7 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
         cases.iter().try_for_each(|case| report::say(format_args!("{}: {}", case.family, case.name)))?;
         return Ok(Outcome::Done);
     }
-    let mut trials = stress::trials(&cases, &args.technique).map_err(anyhow::Error::msg)?;
+    let mut trials = stress::trials(&cases, &common.techniques, &args.technique).map_err(anyhow::Error::msg)?;
     if !args.technique.is_empty() {
         trials.retain(|trial| !matches!(trial.case.kind, Kind::Alone(..)) || !args.family.is_empty());
     }

@@ -86,7 +86,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         bail!("--seconds: expected a number of seconds");
     }
     let target = target(args)?;
-    let technique = args.technique.settings()?;
+    let technique = args.technique.settings(&common.techniques)?;
     report::warn_of_idle(common, technique.0, &technique.1);
     let Loaded { field, footprint, .. } = args.terrain.load(common)?;
     let field = Arc::new(field);
@@ -96,6 +96,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         view: args.view.build(&field, args.technique.tolerance()?)?,
         field,
         near: args.view.near,
+        techniques: common.techniques.clone(),
         technique,
         choices: args.technique.settings.clone(),
         overlay,

@@ -1,6 +1,6 @@
 //! Forms of techniques that the suite tries.
 
-use crate::lod::{self, Entry, Need, Settings, TECHNIQUES, Values};
+use crate::lod::{Entry, Need, Settings, TechniqueSpec, Techniques, Values};
 
 /// A technique with its settings.
 #[derive(Clone)]
@@ -34,12 +34,15 @@ impl Form {
     }
 }
 
-/// Each technique asked for as it is; all of the table with all variants if none is.
-pub fn plain(techniques: &[String]) -> Result<Vec<Form>, String> {
-    if techniques.is_empty() {
-        return Ok(TECHNIQUES.iter().flat_map(variants).collect());
+/// Returns each technique named, with its default settings; all techniques and variants if none is named.
+///
+/// # Errors
+/// If a name is unknown. The error lists all names.
+pub fn plain(techniques: &Techniques, names: &[String]) -> Result<Vec<Form>, String> {
+    if names.is_empty() {
+        return Ok(techniques.entries().iter().flat_map(|entry| variants(entry)).collect());
     }
-    techniques.iter().map(|name| named(name)).collect()
+    names.iter().map(|name| named(techniques, name)).collect()
 }
 
 fn variants(entry: &'static Entry) -> impl Iterator<Item = Form> {
@@ -47,19 +50,24 @@ fn variants(entry: &'static Entry) -> impl Iterator<Item = Form> {
     std::iter::once(None).chain(others).map(move |variant| Form::new(entry, variant, &[]))
 }
 
-fn named(name: &str) -> Result<Form, String> {
-    let (technique, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
-    let known = || TECHNIQUES.iter().flat_map(variants).map(|form| form.name).collect::<Vec<_>>().join(", ");
-    let entry = lod::find(technique).ok_or_else(|| format!("--technique {name}: expected one of {}", known()))?;
-    let Some(variant) = variant else { return Ok(Form::new(entry, None, &[])) };
-    let found = entry.variants.iter().find(|known| known.name == variant);
-    let found = found.ok_or_else(|| format!("--technique {name}: expected one of {}", known()))?;
-    Ok(Form::new(entry, Some(found.name), &[]))
+fn named(techniques: &Techniques, name: &str) -> Result<Form, String> {
+    let found = name.parse().ok().and_then(|spec: TechniqueSpec| {
+        let is_named = |form: &Form| form.variant == spec.variant.as_deref();
+        variants(techniques.find(&spec.name)?).find(is_named)
+    });
+    found.ok_or_else(|| {
+        let known: Vec<_> = techniques.specs().iter().map(TechniqueSpec::to_string).collect();
+        format!("--technique {name}: expected one of {}", known.join(", "))
+    })
 }
 
-/// The same, and then each with every word of every setting, one at a time, and with what it needs to do something.
-pub fn every_word(techniques: &[String]) -> Result<Vec<Form>, String> {
-    let plain = plain(techniques)?;
+/// Returns the forms of [`plain`], and then each with every word of every setting. One setting changes at a time, with
+/// the others that it needs to have an effect.
+///
+/// # Errors
+/// If a name is unknown.
+pub fn every_word(techniques: &Techniques, names: &[String]) -> Result<Vec<Form>, String> {
+    let plain = plain(techniques, names)?;
     let with_words = |form: Form| {
         let words = form.entry.settings.iter().flat_map(|setting| {
             let words = if let Values::Words(words) = setting.values { words } else { &[] };

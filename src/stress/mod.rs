@@ -33,6 +33,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use rayon::prelude::*;
 
 use crate::height::Field;
+use crate::lod::Techniques;
 use crate::view::View;
 
 pub use self::flight::Flight;
@@ -180,13 +181,16 @@ fn panic_text(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
 }
 
-/// The trials of some cases with some techniques: in flights and on their own, the forms of every word.
-pub fn trials(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<Trial>, String> {
+/// Returns the trials of some cases with the techniques named, or with all. A flight tries every word of every setting.
+///
+/// # Errors
+/// If a name is unknown.
+pub fn trials(cases: &[&'static Case], techniques: &Techniques, names: &[String]) -> Result<Vec<Trial>, String> {
     let mut trials = Vec::new();
     for &case in cases {
         let forms = match case.kind {
-            Kind::Terrain(_) | Kind::Each(_) => forms::plain(techniques)?,
-            Kind::Flight(_) => forms::every_word(techniques)?,
+            Kind::Terrain(_) | Kind::Each(_) => forms::plain(techniques, names)?,
+            Kind::Flight(_) => forms::every_word(techniques, names)?,
             Kind::Alone(..) => Vec::new(),
         };
         if let Kind::Alone(..) = case.kind {

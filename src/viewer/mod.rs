@@ -18,7 +18,7 @@ use winit::event_loop::EventLoop;
 use crate::gpu::Choice;
 use crate::height::Field;
 use crate::lod::budget::Target;
-use crate::lod::{Entry, Settings};
+use crate::lod::{Entry, Settings, Techniques};
 use crate::plan::Look;
 use crate::view::View;
 use app::{App, Stop};
@@ -34,7 +34,9 @@ pub struct Setup {
     pub view: View,
     /// Near plane, metres, unless it follows the height above ground.
     pub near: Option<f64>,
-    /// The technique and its settings.
+    /// The techniques that keys choose from.
+    pub techniques: Techniques,
+    /// The technique at the start, and its settings.
     pub technique: (&'static Entry, Settings),
     /// What was set on that technique.
     pub choices: Vec<(String, String)>,

@@ -10,6 +10,7 @@ use cuesta::cli::scene::{LookArgs, ReadArgs, ViewArgs};
 use cuesta::cli::technique::TechniqueArgs;
 use cuesta::cli::{Cli, Command, Common, one_line};
 use cuesta::height::{Field, save, synth};
+use cuesta::lod::Techniques;
 use fastrand::Rng;
 
 use super::views::check_list;
@@ -127,7 +128,7 @@ fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: 
         return;
     };
     look.map(|look| outcome_of(look.build(&quiet(), &TERRAIN.1, (&loaded.field, &loaded.footprint))));
-    let Some((entry, settings)) = outcome_of(technique.settings()) else { return };
+    let Some((entry, settings)) = outcome_of(technique.settings(&Techniques::built_in())) else { return };
     let field: Arc<Field> = Arc::new(loaded.field);
     let Some(view) = outcome_of(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else {
         return;

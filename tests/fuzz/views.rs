@@ -7,6 +7,7 @@ use cuesta::draw::layout::Frame;
 use cuesta::draw::{DrawList, expand};
 use cuesta::height::bezier::{Bezier, LAYERS};
 use cuesta::height::{Field, Holes, Samples, synth};
+use cuesta::lod::Techniques;
 use cuesta::stress::forms::{Form, every_word};
 use cuesta::view::{Metric, Tolerance, View};
 use fastrand::Rng;
@@ -44,7 +45,8 @@ pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
 });
 
 static ENDLESS: LazyLock<Arc<Field>> = LazyLock::new(|| Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS)))));
-static FORMS: LazyLock<Vec<Form>> = LazyLock::new(|| every_word(&[]).expect("the table's own"));
+static FORMS: LazyLock<Vec<Form>> =
+    LazyLock::new(|| every_word(&Techniques::built_in(), &[]).expect("the table's own"));
 
 /// A number: within the field, at a sample, or far beyond all reason.
 fn number(random: &mut Rng, scale: f64) -> f64 {

@@ -13,7 +13,7 @@ use cuesta::bench::run::{Ended, Run};
 use cuesta::bench::{BenchBackend, Case, Terrain, journal};
 use cuesta::gpu::Gpu;
 use cuesta::height::{Field, synth};
-use cuesta::lod::TECHNIQUES;
+use cuesta::lod::{TECHNIQUES, Techniques};
 use cuesta::plan::Look;
 
 use super::memory::{Work, drawn, measured};
@@ -69,7 +69,7 @@ fn bench(gpu: &Arc<Gpu>, folder: &Path, (terrain, field): &(Terrain, Arc<Field>)
         let path = mock::case(terrain, name, 2.0, "certified", "spin");
         Case { size: [32, 20], frames: 2, every: 1, ..path }
     };
-    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default(), Techniques::built_in());
     let fields = vec![(terrain.clone(), Arc::clone(field))];
     let (cases, stop) = (vec![case("geomipmap"), case("clusters")], AtomicBool::new(false));
     let header = mock::header(&mut backend as &mut dyn BenchBackend, &fields);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::height::{Field, Options, load};
-use cuesta::lod::{Entry, Settings, Technique, geomipmap};
+use cuesta::lod::{Entry, Settings, Technique, Techniques, geomipmap};
 use cuesta::stress::jitter::{Jitter, LIMIT_PX, Way};
 use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
 use cuesta::stress::{Case, Finding, Form, Kind, Trial, cases, forms, saved};
@@ -61,7 +61,7 @@ static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 
 fn form(entry: &'static Entry) -> Form {
-    let [form] = forms::plain(&["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
+    let [form] = forms::plain(&Techniques::built_in(), &["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
     Form { entry, name: entry.name.to_string(), ..form }
 }
 
