@@ -8,12 +8,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::bench::paths;
-use cuesta::bench::statistics::Percentiles;
-use cuesta::draw::DrawList;
-use cuesta::height::{self, Field, Options};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::bench::statistics::Percentiles;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{self, Field, Options};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::{Metric, Tolerance, View};
 
 /// Frames of a path.
 const FRAMES: usize = 48;

@@ -6,11 +6,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::bench::paths;
-use cuesta::draw::DrawList;
-use cuesta::height::{Field, synth};
-use cuesta::lod::{self, Settings};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::view::{Metric, Tolerance, View};
 
 /// Frames of the circle that are timed, and times that each is.
 const FRAMES: usize = 50;

@@ -1,7 +1,7 @@
 //! The program `cuesta`.
 
-use cuesta::lod::Techniques;
+use cuesta::internal::lod::Techniques;
 
 fn main() -> std::process::ExitCode {
-    cuesta::cli::main(&Techniques::built_in())
+    cuesta::internal::cli::main(&Techniques::built_in())
 }

@@ -2,8 +2,10 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
-use super::{Entry, TECHNIQUES};
+use super::{Entry, Settings, TECHNIQUES, Technique};
+use crate::height::Field;
 
 /// The techniques that a program offers: the built-in [`TECHNIQUES`], and a caller's own.
 ///
@@ -50,6 +52,16 @@ impl Techniques {
             let known: Vec<_> = self.entries.iter().map(|entry| entry.name).collect();
             format!("{}: expected one of {}", spec.name, known.join(", "))
         })
+    }
+
+    /// Prepares a technique, named as `technique` or `technique:variant`, with its default settings for a field.
+    ///
+    /// # Errors
+    /// If the name is unknown or the technique cannot draw the field.
+    pub fn prepare(&self, spec: &str, field: &Arc<Field>) -> Result<Box<dyn Technique>, String> {
+        let spec: TechniqueSpec = spec.parse()?;
+        let entry = self.entry(&spec)?;
+        entry.prepare(field, &Settings::new(entry, spec.variant.as_deref(), &[])?)
     }
 
     /// Returns every technique and every variant, each as it is written on the command line.

@@ -4,6 +4,7 @@ pub mod capture;
 mod deep;
 pub mod holes;
 mod parts;
+pub mod picture;
 pub mod probed;
 pub mod savings;
 

@@ -84,7 +84,8 @@ fn forbidden(module: &[String], target: &[String]) -> Option<String> {
     let (from, to) = (module.first()?, target.first()?);
     if from == to {
         let rooms = (module.get(1)?, target.get(1)?);
-        let is_room = |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
+        let is_room =
+            |name: &str| cuesta::internal::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
         let meet = from == "lod" && rooms.0 != rooms.1 && is_room(rooms.0) && is_room(rooms.1);
         return meet.then(|| format!("technique {} uses technique {}", rooms.0, rooms.1));
     }

@@ -1,11 +1,11 @@
 //! Regressions in simulated times, as noisy as those of a software device on a shared machine: each time moves by up
 //! to 12 %, one in twenty by 38 %.
 
-use cuesta::bench::compare::{THRESHOLD, compare};
-use cuesta::bench::results::Results;
-use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary, TimeRow, Within};
-use cuesta::bench::run::{FrameSample, Timed};
-use cuesta::bench::{Case, Times};
+use cuesta::internal::bench::compare::{THRESHOLD, compare};
+use cuesta::internal::bench::results::Results;
+use cuesta::internal::bench::rows::{ErrorRow, Errors, Row, Summary, TimeRow, Within};
+use cuesta::internal::bench::run::{FrameSample, Timed};
+use cuesta::internal::bench::{Case, Times};
 
 use super::mock::{self, Mock};
 

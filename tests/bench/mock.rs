@@ -6,15 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::goal::ToleranceController;
-use cuesta::bench::rows::{
+use cuesta::internal::bench::goal::ToleranceController;
+use cuesta::internal::bench::rows::{
     AngleBin, Bin, Decision, Device, Economy, Errors, Header, ImageError, Machine, PeersError, PendingFrames, Plan,
     Pop, Reference, Summary, Within, Worst,
 };
-use cuesta::bench::run::{BenchBackend, BenchScene, Ended, FrameSample, Run, Timed};
-use cuesta::bench::{Case, SCHEMA, Terrain};
-use cuesta::height::Field;
-use cuesta::height::synth::{Kind, synth};
+use cuesta::internal::bench::run::{BenchBackend, BenchScene, Ended, FrameSample, Run, Timed};
+use cuesta::internal::bench::{Case, SCHEMA, Terrain};
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::{Kind, synth};
 use image::{Rgb, RgbImage};
 
 /// Its one adjustable thing: what it leaves unmeasured.

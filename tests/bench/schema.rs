@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use boon::{Compiler, SchemaIndex, Schemas};
-use cuesta::bench::Case;
-use cuesta::bench::goal::Goal;
-use cuesta::bench::journal::ROWS;
-use cuesta::bench::results::{self, RESULTS, Results, TABLE};
-use cuesta::bench::rows::{ErrorRow, Errors, Row, Summary};
-use cuesta::renamed;
+use cuesta::internal::bench::Case;
+use cuesta::internal::bench::goal::Goal;
+use cuesta::internal::bench::journal::ROWS;
+use cuesta::internal::bench::results::{self, RESULTS, Results, TABLE};
+use cuesta::internal::bench::rows::{ErrorRow, Errors, Row, Summary};
+use cuesta::internal::renamed;
 use serde_json::Value;
 
 use super::mock;

@@ -1,7 +1,7 @@
 //! Numbers as flags take them: negative ones, gdalinfo's spellings, and errors that name only flags that were given.
 
 use clap::error::ErrorKind;
-use cuesta::cli::{Cli, command};
+use cuesta::internal::cli::{Cli, command};
 
 use super::*;
 use crate::height::{
@@ -39,7 +39,7 @@ fn every_flag_for_numbers_takes_negative_ones() {
             for value in ["-1", "-3.4028234663852886e+38", "-1.#IND", "-inf", "-1,-1"] {
                 if let Err(error) = parse(value) {
                     // A value that is refused for what it is, by the flag's name.
-                    let line = cuesta::cli::one_line(&error);
+                    let line = cuesta::internal::cli::one_line(&error);
                     let is_named = line.contains(&flag) && !line.contains("unexpected");
                     // A flag whose value may be left out takes no word that begins like a flag.
                     assert!(is_named || long == "measure", "{} {flag} {value}: {line}", subcommand.get_name());

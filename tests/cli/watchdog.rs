@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use cuesta::height::save::save;
-use cuesta::lod::TECHNIQUES;
-use cuesta::stress::{self, Kind};
+use cuesta::internal::height::save::save;
+use cuesta::internal::lod::TECHNIQUES;
+use cuesta::internal::stress::{self, Kind};
 use rayon::prelude::*;
 
 use super::*;

@@ -8,9 +8,9 @@ mod sweep;
 
 use std::sync::Arc;
 
-use cuesta::lod::TECHNIQUES;
-use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
-use cuesta::stress::views;
+use cuesta::internal::lod::TECHNIQUES;
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::views;
 use rayon::prelude::*;
 
 /// All laws at once, so that each technique is prepared once: a failure names the law, the technique with its

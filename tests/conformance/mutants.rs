@@ -3,19 +3,19 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Seams, Source,
     Topology, skirts,
 };
-use cuesta::height::Field;
-use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::{Lens, View};
+use cuesta::internal::height::Field;
+use cuesta::internal::lod::geomipmap::mesh::{BlockMesh, Masks, side};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::{Lens, View};
 
-use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
-use cuesta::stress::views;
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::views;
 
 use super::cases;
 
@@ -329,7 +329,7 @@ fn narrower(view: &View, _: &mut u32) -> View {
 
 fn with_paper_metric(view: &View, _: &mut u32) -> View {
     let mut view = *view;
-    view.tolerance.metric = cuesta::view::Metric::Paper;
+    view.tolerance.metric = cuesta::internal::view::Metric::Paper;
     view
 }
 

@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 use clap::Arg;
-use cuesta::cli::bench::{BenchArgs, MeasureArgs};
-use cuesta::cli::cases::Planned;
-use cuesta::cli::scene::{LookArgs, ReadArgs, ViewArgs};
-use cuesta::cli::technique::TechniqueArgs;
-use cuesta::cli::{Cli, Command, Common, one_line};
-use cuesta::height::{Field, save, synth};
-use cuesta::lod::Techniques;
+use cuesta::internal::cli::bench::{BenchArgs, MeasureArgs};
+use cuesta::internal::cli::cases::Planned;
+use cuesta::internal::cli::scene::{LookArgs, ReadArgs, ViewArgs};
+use cuesta::internal::cli::technique::TechniqueArgs;
+use cuesta::internal::cli::{Cli, Command, Common, one_line};
+use cuesta::internal::height::{Field, save, synth};
+use cuesta::internal::lod::Techniques;
 use fastrand::Rng;
 
 use super::views::check_list;
@@ -60,7 +60,7 @@ static TERRAIN: LazyLock<(tempfile::TempDir, String)> = LazyLock::new(|| {
 fn value(random: &mut Rng, argument: &Arg) -> String {
     let own = argument.get_possible_values();
     let technique = |random: &mut Rng| {
-        let entry = mutate::one(random, cuesta::lod::TECHNIQUES);
+        let entry = mutate::one(random, cuesta::internal::lod::TECHNIQUES);
         let variant = entry.variants.get(random.usize(..4)).map(|variant| format!(":{}", variant.name));
         format!("{}{}", entry.name, variant.unwrap_or_default())
     };
@@ -75,7 +75,7 @@ fn value(random: &mut Rng, argument: &Arg) -> String {
 
 /// A command line without the program's name.
 fn words(random: &mut Rng) -> Vec<String> {
-    let root = cuesta::cli::command();
+    let root = cuesta::internal::cli::command();
     let commands: Vec<_> = root.get_subcommands().collect();
     let command = mutate::one(random, &commands);
     let mut words = vec![command.get_name().to_string()];

@@ -1,6 +1,6 @@
 //! Height files: small ones of every format, changed.
 
-use cuesta::height::{Options, load_bytes_with};
+use cuesta::internal::height::{Options, load_bytes_with};
 use fastrand::Rng;
 
 use super::{fuzz, mutate};

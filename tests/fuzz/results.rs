@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cuesta::bench::goal::Goal;
-use cuesta::bench::journal::{Journal, ROWS};
-use cuesta::bench::results::{self, Results};
-use cuesta::bench::{Case, compare};
-use cuesta::report;
-use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
+use cuesta::internal::bench::goal::Goal;
+use cuesta::internal::bench::journal::{Journal, ROWS};
+use cuesta::internal::bench::results::{self, Results};
+use cuesta::internal::bench::{Case, compare};
+use cuesta::internal::report;
+use cuesta::internal::stress::rows::{FILE, Row, SCHEMA, Stress};
 use fastrand::Rng;
 use serde_json::Value;
 

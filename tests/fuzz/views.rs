@@ -2,14 +2,14 @@
 
 use std::sync::{Arc, LazyLock};
 
-use cuesta::cli::scene::ViewArgs;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, expand};
-use cuesta::height::bezier::{Bezier, LAYERS};
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::lod::Techniques;
-use cuesta::stress::forms::{Form, every_word};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::cli::scene::ViewArgs;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DrawList, expand};
+use cuesta::internal::height::bezier::{Bezier, LAYERS};
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::lod::Techniques;
+use cuesta::internal::stress::forms::{Form, every_word};
+use cuesta::internal::view::{Metric, Tolerance, View};
 use fastrand::Rng;
 
 use super::fuzz;
@@ -123,7 +123,7 @@ impl Pose {
 }
 
 /// Holds what any view may ask of any technique: triangles of the field, of numbers.
-pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::Technique) {
+pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::internal::lod::Technique) {
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     assert!(list.tolerance_scale >= 1.0, "scale {}", list.tolerance_scale);
@@ -131,7 +131,7 @@ pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::T
         return;
     }
     let [last_x, last_z] = field.size().map(|n| (i64::from(n) - 1) << list.fraction_bits);
-    let is_inside = |corner: &cuesta::height::surface::Corner| {
+    let is_inside = |corner: &cuesta::internal::height::surface::Corner| {
         let [x, z] = [corner.x, corner.z].map(i64::from);
         (0..=last_x).contains(&x) && (0..=last_z).contains(&z) && corner.y.is_finite()
     };

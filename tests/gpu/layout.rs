@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cuesta::draw::layout;
-use cuesta::gpu::shaders;
+use cuesta::internal::draw::layout;
+use cuesta::internal::gpu::shaders;
 
 /// Offsets of the members of every named struct of a module: struct name → member name → offset.
 fn offsets(words: &[u32]) -> BTreeMap<String, BTreeMap<String, u32>> {

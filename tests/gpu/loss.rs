@@ -6,15 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::device::DeviceBackend;
-use cuesta::bench::results::Results;
-use cuesta::bench::rows::Row;
-use cuesta::bench::run::{Ended, Run};
-use cuesta::bench::{BenchBackend, Case, Terrain, journal};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::{TECHNIQUES, Techniques};
-use cuesta::plan::Look;
+use cuesta::internal::bench::device::DeviceBackend;
+use cuesta::internal::bench::results::Results;
+use cuesta::internal::bench::rows::Row;
+use cuesta::internal::bench::run::{Ended, Run};
+use cuesta::internal::bench::{BenchBackend, Case, Terrain, journal};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{TECHNIQUES, Techniques};
+use cuesta::internal::plan::Look;
 
 use super::memory::{Work, drawn, measured};
 use super::{on_device, technique};

@@ -1,11 +1,11 @@
 //! A frame in parts, each drawn by a submission of its own while the next is walked: the same picture to the bit.
 
-use cuesta::bench::paths;
-use cuesta::draw::DrawList;
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::scene::Copy;
-use cuesta::view::{Metric, Tolerance};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::scene::Copy;
+use cuesta::internal::view::{Metric, Tolerance};
 
 use super::painter::renderer;
 use super::{mountains, on_device, technique};

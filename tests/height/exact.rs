@@ -1,6 +1,6 @@
 //! What is written is read back.
 
-use cuesta::height::{Field, Loaded, Options, Samples, load_bytes};
+use cuesta::internal::height::{Field, Loaded, Options, Samples, load_bytes};
 use png::{BitDepth, ColorType};
 
 use super::{

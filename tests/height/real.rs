@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cuesta::height::{self, Encoding, Loaded, Options};
+use cuesta::internal::height::{self, Encoding, Loaded, Options};
 
 /// The path of a shared data file; `None`, said aloud, where they are not.
 pub fn shared(file: &str) -> Option<PathBuf> {

@@ -1,8 +1,8 @@
 //! The budget controller against made-up costs: loads that step, climb, spike and swing, curves from nearly flat to
 //! slopes of 10⁴ and stairs, late and noisy costs.
 
-use cuesta::lod::budget::{RANGE_PX, Target};
-use cuesta::stress::simulated_loads::{COST, EVENT, Load, constant, overshoot, power, settling, step};
+use cuesta::internal::lod::budget::{RANGE_PX, Target};
+use cuesta::internal::stress::simulated_loads::{COST, EVENT, Load, constant, overshoot, power, settling, step};
 
 /// Starts too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px, load)`.
 type Event = (&'static str, usize, f64, Box<dyn Fn(usize) -> f64 + Sync>);

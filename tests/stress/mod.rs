@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
-use cuesta::height::{Field, Options, load};
-use cuesta::lod::{Entry, Settings, Technique, Techniques, geomipmap};
-use cuesta::stress::jitter::{Jitter, LIMIT_PX, Way};
-use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
-use cuesta::stress::{Case, Finding, Form, Kind, Trial, cases, forms, saved};
-use cuesta::view::View;
+use cuesta::internal::draw::{DrawList, Geometry, Limits, PipelineRequirements};
+use cuesta::internal::height::{Field, Options, load};
+use cuesta::internal::lod::{Entry, Settings, Technique, Techniques, geomipmap};
+use cuesta::internal::stress::jitter::{Jitter, LIMIT_PX, Way};
+use cuesta::internal::stress::rows::{FILE, Row, SCHEMA, Stress};
+use cuesta::internal::stress::{Case, Finding, Form, Kind, Trial, cases, forms, saved};
+use cuesta::internal::view::View;
 
 /// GeoMipMapping without its last block.
 struct BlockLost(Box<dyn Technique>);
@@ -168,7 +168,7 @@ fn a_suite_is_read_again_as_it_was_written_and_drawn_as_a_page() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(FILE), serde_json::to_vec(&stress).unwrap()).unwrap();
     assert_eq!(Stress::read(folder.path()).unwrap(), stress);
-    let page = std::fs::read_to_string(cuesta::report::write_stress(folder.path()).unwrap()).unwrap();
+    let page = std::fs::read_to_string(cuesta::internal::report::write_stress(folder.path()).unwrap()).unwrap();
     for part in ["1 checks passed, 1 failed", "1 of 2", "a gap &amp; a crack", "flat &lt;b&gt;"] {
         assert!(page.contains(part), "{part}");
     }

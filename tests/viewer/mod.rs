@@ -163,13 +163,14 @@ fn looks(viewer: &Viewer, start: &RgbImage) {
 /// The window says which technique draws; a wider tolerance is seen in the levels.
 fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
     let title = || viewer.display.act(&format!("getwindowname {}", viewer.window));
-    for (k, entry) in cuesta::lod::TECHNIQUES.iter().enumerate() {
+    for (k, entry) in cuesta::internal::lod::TECHNIQUES.iter().enumerate() {
         viewer.press(&format!("{}", k + 1));
         eventually("the title", || (title() == format!("cuesta: demo, {}", entry.name)).then_some(()));
         let drawn = viewer.render();
         assert!(difference(start, &drawn) < 0.1, "{}: {}", entry.name, difference(start, &drawn));
     }
-    let geomipmap = cuesta::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
+    let geomipmap =
+        cuesta::internal::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
     let fine = viewer.after(&format!("{} l", geomipmap + 1));
     let coarse = viewer.after("plus plus plus plus plus plus");
     assert!(difference(&fine, &coarse) > 0.1, "tolerance: {}", difference(&fine, &coarse));
