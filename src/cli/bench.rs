@@ -1,4 +1,4 @@
-//! `cuesta bench`: error against run time along named paths; `cuesta bench compare`: what changed.
+//! `cuesta bench`: error and run time along named paths. `cuesta bench compare`: the differences of two runs.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -19,89 +19,89 @@ use crate::bench::{BenchBackend, SCHEMA};
 use crate::lod::TechniqueSpec;
 use crate::plan::Look;
 
-/// Arguments.
+/// Arguments of `cuesta bench`.
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct BenchArgs {
-    /// Something else than measuring.
+    /// Another action than measuring.
     #[command(subcommand)]
     pub action: Option<Action>,
-    /// What is measured.
+    /// Selection of fields, techniques and paths.
     #[command(flatten)]
     pub measure: MeasureArgs,
 }
 
-/// What can be done with measurements.
+/// Actions on finished benchmarks.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// What changed from one benchmark to another; exit code 1 if anything got worse.
+    /// Compare two benchmarks; exit code 1 if anything got worse.
     Compare(CompareArgs),
 }
 
-/// Two benchmarks.
+/// Arguments of `cuesta bench compare`.
 #[derive(Args, Debug)]
 pub struct CompareArgs {
-    /// Directory of the benchmark before.
+    /// Folder of the benchmark before.
     pub a: PathBuf,
-    /// Directory of the benchmark after.
+    /// Folder of the benchmark after.
     pub b: PathBuf,
-    /// What is no regression yet: 0.1 is a tenth.
+    /// Largest relative difference that counts as noise: 0.1 is 10 %.
     #[arg(long, value_name = "SHARE", default_value_t = THRESHOLD)]
     pub threshold: f64,
 }
 
-/// What is measured.
+/// Fields, techniques, tolerances and paths of a benchmark.
 #[derive(Args, Debug)]
 pub struct MeasureArgs {
-    /// Height files of any supported format, directories of web-map tiles, `demo`.
+    /// Height files of any supported format, folders of web-map tiles, or `demo`.
     #[arg(required_unless_present = "kit")]
     pub terrain: Vec<String>,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// Directory for rows, results, pictures and the report; a run that was stopped goes on.
+    /// Folder for rows, results, pictures and the report; a stopped run continues there.
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
-    /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
+    /// Techniques, each `technique` or `technique:variant`, by default all; times are relative to the first one.
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub technique: Vec<TechniqueSpec>,
-    /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
+    /// A setting, for every technique that has it; may be repeated. Each of several values is measured.
     #[arg(long = "set", value_name = "KEY=V,…", value_parser = super::scene::key_value)]
     pub settings: Vec<(String, String)>,
-    /// Errors allowed, pixels.
+    /// Largest errors on the screen, pixels; each is measured.
     #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
     pub tolerance: Vec<f64>,
-    /// Triangles a frame to hold by moving the tolerance, which starts as the first one given; each is measured.
+    /// Triangles per frame to hold by moving the tolerance; starts at the first tolerance. Each is measured.
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub triangles: Vec<f64>,
-    /// Milliseconds a frame to hold in the same way.
+    /// Milliseconds per frame to hold by moving the tolerance; each is measured.
     #[arg(long, value_name = "MS,…", value_delimiter = ',')]
     pub frame_time: Vec<f64>,
     /// Paths to fly; the kit has its own.
     #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = super::cases::path_help())]
     pub path: Vec<String>,
-    /// The meaning of a pixel of error.
+    /// Formula that converts metres of error to pixels.
     #[arg(long, value_enum, default_value_t = Choice::Certified)]
     pub metric: Choice,
-    /// Pixels; the kit has its own.
+    /// Size of the picture, pixels; the kit has its own.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Frames of a path; the kit has its own.
+    /// Frames per path; the kit has its own.
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
-    /// How often each case is timed.
+    /// Number of times that each case is timed.
     #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub rounds: u32,
-    /// What the ground is like from near, and a sun that moves.
+    /// Ground materials and a moving sun.
     #[command(flatten)]
     pub ground: GroundArgs,
-    /// The public benchmark kit; terrains that are given join it.
+    /// Run the public benchmark kit, on the terrains given too.
     #[arg(long)]
     pub kit: bool,
-    /// Of the kit, only the scenes whose name contains one of these, as in "peers-1 2049".
+    /// Run only the scenes of the kit with one of these in their name, as in "peers-1 2049".
     #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
     pub only: Vec<String>,
-    /// A quarter of the frames and two rounds: to see that all works, not to quote.
+    /// A quarter of the frames and two rounds: a smoke test, not for publication.
     #[arg(long)]
     pub quick: bool,
 }
@@ -132,7 +132,7 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
     Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Makes what draws. Every [`BenchScene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
+/// Opens a device to draw the cases that [`Planned`] lists.
 #[cfg(feature = "vulkan")]
 fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
     let gpu = super::render::open(common, false)?;
@@ -149,7 +149,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let mut backend = backend(common, args.ground.over(Look::default())?)?;
     let header = header(backend.as_mut(), &planned)?;
-    // The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
+    // The first Ctrl-C ends the run after the current row, the second one at once. Finished rows are kept either way.
     let stop = interrupt::flag();
     let run = Run {
         folder,
@@ -166,7 +166,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         bar.set_message(step.case.to_string());
     });
     bar.finish_and_clear();
-    // A page of the rows that are there is worth having, and no reason to hide why there are no more.
+    // The page shows the finished rows. Its failure must not hide the reason for missing ones.
     let page = crate::report::write(folder);
     let (ended, page) = (ended?, page?);
     let found = Results::read(folder)?;

@@ -1,4 +1,4 @@
-//! What `cuesta bench` was asked for, turned into fields and cases.
+//! Turns the arguments of `cuesta bench` into fields and cases.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,45 +16,45 @@ use crate::lod::TechniqueSpec;
 
 /// Frames drawn before a path begins.
 const WARM_UP: usize = 5;
-/// About so many frames of a path are measured for errors.
+/// Number of frames of a path that are measured for errors, roughly.
 const MEASURED: usize = 12;
-/// The technique that draws every sample in every view, whatever the tolerance.
+/// The technique that draws every sample in every view at any tolerance.
 const TRUTH: &str = "brute-force";
 
-/// Which metrics are measured.
+/// The metrics to measure.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// A true bound for every pixel.
+    /// An upper bound for every pixel.
     Certified,
-    /// As published.
+    /// The formula of the paper.
     Paper,
-    /// One after the other.
+    /// Both, one after the other.
     Both,
 }
 
-/// What a run draws.
+/// The fields and cases of a run.
 pub struct Planned {
     /// The fields of all cases.
     pub fields: Vec<(Terrain, Arc<Field>)>,
     /// The cases.
     pub cases: Vec<Case>,
-    /// How often each is timed.
+    /// Number of times that each is timed.
     pub rounds: usize,
     /// Frames drawn before a path begins.
     pub warm_up: usize,
-    /// The technique that times are divided by.
+    /// The technique that times are relative to.
     pub base: String,
-    /// What makes two runs the same run, in words.
+    /// Arguments that two parts of one run share; a stopped run continues only under equal ones.
     pub arguments: Vec<String>,
 }
 
-/// The paths, for `--help`.
+/// Lists the paths for `--help`.
 pub fn path_help() -> String {
     let paths: Vec<_> = paths::PATHS.iter().map(|path| format!("{} ({})", path.name, path.about)).collect();
     format!("Paths to fly; the kit has its own: {}", paths.join(", "))
 }
 
-/// One technique as it was asked for.
+/// A requested technique with its settings.
 #[derive(Clone)]
 struct Asked {
     technique: String,
@@ -71,7 +71,10 @@ struct Flight {
 }
 
 impl Planned {
-    /// Reads and makes the fields and lists the cases.
+    /// Reads and synthesises the fields, and lists the cases.
+    ///
+    /// # Errors
+    /// If an argument is wrong or a file cannot be read.
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
         let asked = techniques(common, args)?;
         let numbers = [
@@ -100,7 +103,7 @@ impl Planned {
     }
 }
 
-/// The techniques asked for, checked; all of the table unless some are named.
+/// Checks the requested techniques; all of the table if none is named.
 fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
     let mut specs = args.technique.clone();
     if specs.is_empty() {
@@ -113,7 +116,7 @@ fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
     Ok(specs.iter().map(|spec| asked(common, spec, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// A technique once with each combination of the values of its settings.
+/// Returns a technique once for each combination of the values of its settings.
 fn asked(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) -> Result<Vec<Asked>> {
     let entry = technique::entry(&common.techniques, spec)?;
     let mut all = vec![Vec::new()];
@@ -186,14 +189,14 @@ fn of_files(
 }
 
 impl Flight {
-    /// A quarter of the frames, of which a few are measured.
+    /// Keeps a quarter of the frames, and measures about three of them.
     fn shorten(&mut self) {
         self.frames = self.frames.div_ceil(4);
         self.every = self.frames.div_ceil(3);
     }
 }
 
-/// The cases of a flight; what draws every sample is there once.
+/// Returns the cases of a flight. The technique that draws every sample has one case.
 fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     let metrics: &[&str] = match args.metric {
         Choice::Certified => &["certified"],
@@ -204,7 +207,7 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     let mut cases = Vec::new();
     for (metric, asked) in metrics.iter().flat_map(|metric| asked.iter().map(move |asked| (metric, asked))) {
         let is_truth = asked.technique == TRUTH;
-        // What is held starts from the first tolerance.
+        // A held goal starts from the first tolerance.
         let is_one = is_truth || !goals.is_empty();
         let tolerances = if is_one { &args.tolerance[..1] } else { &args.tolerance[..] };
         let goals: Vec<_> = if is_one && !is_truth { goals.iter().copied().map(Some).collect() } else { vec![None] };
@@ -228,13 +231,13 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     cases
 }
 
-/// What is to be held, if anything.
+/// Returns the budgets to hold.
 fn goals(args: &MeasureArgs) -> Vec<Goal> {
     let triangles = args.triangles.iter().map(|&count| Goal::Triangles(count));
     triangles.chain(args.frame_time.iter().map(|&ms| Goal::FrameMs(ms))).collect()
 }
 
-/// The choices of a run, whatever order and form they were given in.
+/// Describes the choices of a run, independent of their order and spelling.
 fn arguments(args: &MeasureArgs) -> Vec<String> {
     let joined = |values: &[String]| values.join(",");
     let specs: Vec<_> = args.technique.iter().map(TechniqueSpec::to_string).collect();

@@ -1,4 +1,4 @@
-//! `cuesta info`: what was read; the scene plan; the devices.
+//! `cuesta info`: describes height files, the scene plan, and the devices.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,39 +12,39 @@ use super::technique::TechniqueArgs;
 use super::{Common, Outcome, plan, report, working_set};
 use crate::height::{Loaded, SourceFile};
 
-/// Arguments.
+/// Arguments of `cuesta info`.
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; or `demo`.
+    /// Height files of any supported format, or folders of them, as one field; a folder of web-map tiles; or `demo`.
     #[arg(required_unless_present = "devices")]
     pub terrain: Vec<String>,
-    /// How heights are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// What this scene needs on the device, and what it leaves out.
+    /// List the features that this scene needs on the device, and those that it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
-    /// Also how much each feature that is left out would take: each is kept once, for so many frames of the view.
+    /// Measure each feature that is left out: each is kept once, for FRAMES frames of the view.
     #[arg(long, value_name = "FRAMES", requires = "plan", num_args = 0..=1, default_missing_value = "30")]
     pub measure: Option<usize>,
-    /// Draws which nodes of a map of 2^36 texels over the field the view needs, and how fine: a .png.
+    /// Draw the nodes of a map of 2^36 texels over the field that the view needs, by level, as a .png.
     #[arg(long, value_name = "FILE", requires = "terrain", conflicts_with = "plan")]
     pub working_set: Option<PathBuf>,
-    /// The view that is needed for.
+    /// The view for the plan and the working set.
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Vulkan devices, and what is missing on each.
+    /// List Vulkan devices, and the features that each lacks.
     #[arg(long)]
     pub devices: bool,
-    /// The technique planned for.
+    /// The technique of the plan.
     #[command(flatten)]
     pub technique: TechniqueArgs,
-    /// The look planned for.
+    /// The look of the plan.
     #[command(flatten)]
     pub look: LookArgs,
 }
 
-/// What was read.
+/// Description of a field.
 #[derive(Serialize)]
 pub struct Info {
     format: String,
@@ -61,13 +61,13 @@ pub struct Info {
     exact_in_16_bit: bool,
     /// Largest difference between the two ways to split a cell, metres.
     cell_ambiguity_m: f32,
-    /// The files that the heights come from; a later one overlies an earlier one.
+    /// The files with the heights; a later one overlies an earlier one.
     sources: Vec<SourceFile>,
     warnings: Vec<String>,
 }
 
 impl Info {
-    /// Describes a field that was read.
+    /// Describes a field.
     pub fn of(loaded: &Loaded) -> Self {
         let field = &loaded.field;
         let [width, height] = field.size();

@@ -64,7 +64,7 @@ impl Techniques {
         entry.prepare(field, &Settings::new(entry, spec.variant.as_deref(), &[])?)
     }
 
-    /// Returns every technique and every variant, each as it is written on the command line.
+    /// Returns every technique and every variant, spelled as on the command line.
     pub fn specs(&self) -> Vec<TechniqueSpec> {
         let of_entry = |entry: &&'static Entry| {
             let name = entry.name.to_string();

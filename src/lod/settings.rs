@@ -1,14 +1,14 @@
-//! What can be set on a technique: declared in its room, checked here once, read without failure.
+//! Settings of a technique: declared in its module, checked once, then read without failure.
 
 use super::Entry;
 use crate::height::progress::Progress;
 
-/// What a setting may be.
+/// Allowed values of a setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Values {
     /// One of these words.
     Words(&'static [&'static str]),
-    /// A number between these two, inclusive.
+    /// A number in this range, ends included.
     Number(f64, f64),
 }
 
@@ -17,22 +17,22 @@ pub enum Values {
 pub struct Setting {
     /// Its key.
     pub key: &'static str,
-    /// What it may be.
+    /// Allowed values.
     pub values: Values,
-    /// What it is unless set.
+    /// Default value.
     pub default: &'static str,
     /// One line.
     pub about: &'static str,
 }
 
-/// A setting that does something only where another one is one of these words.
+/// A dependency: a setting that has an effect only if another one has one of these words.
 #[derive(Clone, Copy, Debug)]
 pub struct Need {
     /// Its key.
     pub key: &'static str,
-    /// The other's.
+    /// Key of the other setting.
     pub other: &'static str,
-    /// The other's words.
+    /// Words of the other setting.
     pub words: &'static [&'static str],
 }
 
@@ -41,12 +41,15 @@ pub struct Need {
 pub struct Settings {
     variant: Option<&'static str>,
     values: Vec<(&'static Setting, String)>,
-    /// How far the room has come with its preparation, if it says so.
+    /// Progress of the preparation, if the technique reports it.
     pub progress: Progress,
 }
 
 impl Settings {
-    /// The settings of `entry`, `choices` put over the defaults. The error names what is allowed.
+    /// Returns the settings of `entry` with `choices` in place of defaults.
+    ///
+    /// # Errors
+    /// If a variant, a key or a value is unknown. The error lists the allowed ones.
     pub fn new(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Self, String> {
         let variant = match variant {
             None => None,
@@ -67,13 +70,13 @@ impl Settings {
         Ok(Self { variant: variant.map(|v| v.name), values, progress: Progress::default() })
     }
 
-    /// The defaults of `entry`.
+    /// Returns the defaults of `entry`.
     pub fn defaults(entry: &Entry) -> Self {
         let values = entry.settings.iter().map(|s| (s, s.default.to_string())).collect();
         Self { variant: None, values, progress: Progress::default() }
     }
 
-    /// The settings on `entry` that do nothing beside the others, a line each.
+    /// Returns a line for each setting without effect under the others.
     pub fn idle(&self, entry: &Entry) -> Vec<String> {
         let is_set = |key: &str| self.values.iter().any(|(s, value)| s.key == key && value != s.default);
         let is_idle = |need: &&Need| is_set(need.key) && !need.words.contains(&self.word(need.other));
@@ -84,23 +87,23 @@ impl Settings {
         entry.needs.iter().filter(is_idle).map(line).collect()
     }
 
-    /// The variant chosen, if not the default one.
+    /// Returns the variant, if it is not the default one.
     pub fn variant(&self) -> Option<&'static str> {
         self.variant
     }
 
-    /// The value of a setting as a word.
+    /// Returns the value of a setting as a word.
     ///
     /// # Panics
-    /// If the room did not declare the key.
+    /// If the technique did not declare the key.
     pub fn word(&self, key: &str) -> &str {
         &self.values.iter().find(|(s, _)| s.key == key).expect("a declared key").1
     }
 
-    /// The value of a setting as a number.
+    /// Returns the value of a setting as a number.
     ///
     /// # Panics
-    /// If the room did not declare the key as a number.
+    /// If the technique did not declare the key as a number.
     pub fn number(&self, key: &str) -> f64 {
         self.word(key).parse().expect("checked on entry")
     }
