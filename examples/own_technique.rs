@@ -151,7 +151,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let view = View::builder()
         .eye(DVec3::new(12_800.0, 9000.0, 38_000.0))
         .look_at(DVec3::new(12_800.0, 1000.0, 12_800.0))
-        .tolerance_px(2.0)
+        .tolerance_px(32.0)
         .build()?;
     for name in [UNIFORM_GRID.name, "geomipmap"] {
         let mut technique = techniques.prepare(name, &field)?;

@@ -12,7 +12,7 @@ use cuesta::{DrawList, View, accuracy, heights};
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let name = arguments.next().unwrap_or_else(|| "geomipmap".to_string());
-    let tolerance_px = arguments.next().map_or(Ok(1.0), |text| text.parse())?;
+    let tolerance_px = arguments.next().map_or(Ok(4.0), |text| text.parse())?;
 
     // Alpine terrain of 25.6 x 25.6 km, seen from its southern edge.
     let field = Arc::new(heights::demo());

@@ -82,7 +82,7 @@ impl ViewBuilder {
         self
     }
 
-    /// Sets the near plane, metres in front of the eye. [`default_near`] returns one that suits a terrain.
+    /// Sets the near plane, metres in front of the eye. [`default_near`](super::default_near) returns one that suits a terrain.
     pub fn near(mut self, near: f64) -> Self {
         self.view.near = near;
         self

@@ -1,6 +1,6 @@
 //! The random sweep: every technique on random terrain, in random settings and views, held against every invariant.
 //!
-//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`INVARIANTS`](super::laws::LAWS) ([`case`]). One that
+//! A case is plain data, drawn from a seed and a number ([`random`]). It is held against [`INVARIANTS`](super::invariants::INVARIANTS) ([`case`]). One that
 //! fails is made smaller as long as it fails in the same way ([`shrink`]), and is printed as one line of JSON that runs
 //! again anywhere.
 
