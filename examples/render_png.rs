@@ -21,7 +21,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut technique = Techniques::built_in().prepare("sphere-tree", &field)?;
     // Tints by height; the sun stands in the west, 35° high.
     let look = Look { colour: Colour::Height, sun: [270.0, 35.0], ..Look::default() };
-    let picture = offscreen::picture(&field, technique.as_mut(), &view, &look, &Choice::Best)?;
+    let mut picture = offscreen::picture(&field, technique.as_mut(), &view, &look, &Choice::Best)?;
+    // Alpha is 0 where the sky is: a file without transparency shows it.
+    picture.pixels_mut().for_each(|pixel| pixel.0[3] = 255);
     picture.save(&file)?;
     println!("{file}: {} x {} pixels", picture.width(), picture.height());
     Ok(())
