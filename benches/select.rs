@@ -1,4 +1,4 @@
-//! Benchmark of each technique's selection, without a GPU: `cargo bench --no-default-features -- FILE
+//! Benchmark of each technique's selection, without a GPU: `cargo bench --no-default-features --features bench -- FILE
 //! [technique[:variant] …]`.
 //!
 //! Every frame of a path is selected once to warm up and then several times. Other memory is read between selections,

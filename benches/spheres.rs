@@ -6,7 +6,7 @@
 //! path's), as published. Also measured: selection time and bytes sent per frame with streamed triangles and with
 //! resident blocks.
 //!
-//! `cargo bench --no-default-features --bench spheres` on an idle machine; `-- 100000 leaping` runs that case alone.
+//! `cargo bench --no-default-features --features bench --bench spheres` on an idle machine; `-- 100000 leaping` runs that case alone.
 
 use std::hint::black_box;
 use std::sync::Arc;

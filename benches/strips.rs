@@ -2,7 +2,7 @@
 //! rendering.
 //!
 //! Their scene: 8 × 8 pages of 64 × 64 cells tiled over the plane, and a circle flown low above ground; one level
-//! scale per series. `cargo bench --no-default-features --bench strips` on an idle machine.
+//! scale per series. `cargo bench --no-default-features --features bench --bench strips` on an idle machine.
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! No command of README's list runs longer than its bound, whatever the field: what never ends is found here.
+//! Every command of README's list ends within its bound on every field: finds endless loops.
 
 use std::collections::BTreeSet;
 use std::process::Stdio;
@@ -11,11 +11,11 @@ use rayon::prelude::*;
 
 use super::*;
 
-/// Seconds for a command on a field of the stress suite: each takes a few at most on a machine with other work.
+/// Time limit of a command on a field of the stress suite, seconds. Each takes a few seconds on a busy machine.
 const BOUND_S: u64 = 120;
 
-/// README's commands on a field, small ones: the number of frames and pixels is not what could make them run for ever. `T`
-/// stands for a technique. Those after the first three need a device.
+/// README's commands with few frames and pixels: their number cannot cause an endless loop. `T` stands for a technique.
+/// Those after the first three need a device.
 const COMMANDS: &[&[&str]] = &[
     &["info", "F"],
     &["info", "F", "--working-set", "set.png", "--size", "160x90", "--technique", "T"],
@@ -45,13 +45,13 @@ const COMMANDS: &[&[&str]] = &[
     &["bench", "compare", "run", "run"],
     &["report", "run"],
 ];
-/// As many of them go without a device.
+/// Number of commands that need no device.
 const WITHOUT_A_DEVICE: usize = 3;
-/// README's commands that the list leaves out: a window, which has tests of its own, what reads no field, and the stress
-/// suite itself.
+/// Commands of README that the list leaves out: the window, which has its own tests, those without a field, and the
+/// stress suite.
 const ELSEWHERE: [&str; 3] = ["view", "synth", "stress"];
 
-/// Ends a command that runs longer than its bound, and returns how it ended.
+/// Runs a command and kills it at its limit. Returns its exit status.
 fn watched(folder: &Path, arguments: &[&str]) -> Result<i32, String> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
     command.args(arguments).current_dir(folder).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");

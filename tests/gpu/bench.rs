@@ -10,6 +10,7 @@ use cuesta::internal::bench::rows::{Case, ErrorRow, Header, Machine, Row, Terrai
 use cuesta::internal::bench::run::{BenchBackend, Ended, Run};
 use cuesta::internal::gpu::Gpu;
 use cuesta::internal::height::Field;
+use cuesta::internal::lod::Techniques;
 use cuesta::internal::plan::Look;
 
 use super::{mountains, on_device};
@@ -32,7 +33,7 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
         every: 4,
     };
     let fields = vec![(terrain.clone(), Arc::clone(field))];
-    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default(), Techniques::built_in());
     let (device, plans) = backend.describe(&fields).unwrap();
     let header = Header {
         schema: cuesta::internal::bench::SCHEMA,

@@ -1,10 +1,10 @@
-//! The README says what the tables say.
+//! README lists the same techniques and subcommands as the tables.
 
 use cuesta::internal::lod::TECHNIQUES;
 
 const README: &str = include_str!("../../README.md");
 
-/// The rows of the README's table of techniques: name, and the rest.
+/// Returns the rows of README's table of techniques: name, and the other cells.
 fn rows() -> Vec<(String, String)> {
     let table = README.split("## Techniques").nth(1).and_then(|rest| rest.split("\n\n").nth(1)).expect("a table");
     let row = |line: &str| {

@@ -2,7 +2,7 @@
 
 use cuesta::internal::draw::{DrawList, Geometry, Limits};
 use cuesta::internal::height::{Options, load};
-use cuesta::internal::lod::{Entry, Technique, geomipmap};
+use cuesta::internal::lod::{Entry, Technique, Techniques, geomipmap};
 use cuesta::internal::stress::jitter::{Jitter, LIMIT_PX, VertexPlacement};
 use cuesta::internal::stress::rows::{FILE, Row, SCHEMA, Stress};
 use cuesta::internal::stress::{Case, CaseRun, Finding, Kind, TechniqueConfig, cases, forms, saved};
@@ -32,7 +32,8 @@ static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 
 fn config(entry: &'static Entry) -> TechniqueConfig {
-    let [config] = forms::with_defaults(&["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
+    let [config] =
+        forms::with_defaults(&Techniques::built_in(), &["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
     TechniqueConfig { entry, name: entry.name.to_string(), ..config }
 }
 

@@ -1,7 +1,7 @@
 //! Builds the triangles of split diamonds by descending the binary tree of wedges, with culling.
 //!
-//! A vertex fades in from the middle of its hypotenuse *as drawn* to its own height: drawn(m) = mid(drawn(a), drawn(c))
-//! + (1 − w)·(h(m) − mid(h(a), h(c))). A vertex's weight w is at least the weights of all vertices it depends on. The
+//! A vertex fades in from the middle of its hypotenuse *as drawn* to its own height:
+//! drawn(m) = mid(drawn(a), drawn(c)) + (1 − w)·(h(m) − mid(h(a), h(c))). A vertex's weight w is at least the weights of all vertices it depends on. The
 //! surface is therefore the mean over t in 0..1 of the meshes of the vertices with w ≤ t. Each of these meshes is
 //! conforming and contains all diamonds that must have split. Each keeps the tolerance, and so does their mean. A
 //! vertex appears and disappears at w = 1, where the surface is the same with and without it.
