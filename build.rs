@@ -24,8 +24,13 @@ mod plan {
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     record_commit();
+    println!("cargo:rerun-if-env-changed=DOCS_RS");
     #[cfg(feature = "vulkan")]
-    shaders::compile_all();
+    match std::env::var_os("DOCS_RS") {
+        // Documentation needs no shaders.
+        Some(_) => shaders::write_table("&["),
+        None => shaders::compile_all(),
+    }
 }
 
 /// Sets `CUESTA_COMMIT` in a clone.
@@ -96,10 +101,16 @@ mod shaders {
                 }
             }
         }
-        std::fs::write(out.join("shaders.rs"), table + "]\n").expect("OUT_DIR is writable");
+        write_table(&table);
         if failed {
             std::process::exit(1);
         }
+    }
+
+    /// Closes the table of shaders and writes it where `src/gpu/shaders.rs` includes it.
+    pub fn write_table(table: &str) {
+        let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
+        std::fs::write(out.join("shaders.rs"), format!("{table}]\n")).expect("OUT_DIR is writable");
     }
 
     fn compile(compiler: &Compiler, path: &Path, kind: ShaderKind, define: Option<&str>) -> Result<Vec<u8>, String> {

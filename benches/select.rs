@@ -1,4 +1,4 @@
-//! Benchmark of each technique's selection, without a GPU: `cargo bench --no-default-features -- FILE
+//! Benchmark of each technique's selection, without a GPU: `cargo bench --no-default-features --features bench -- FILE
 //! [technique[:variant] …]`.
 //!
 //! Every frame of a path is selected once to warm up and then several times. Other memory is read between selections,
@@ -8,12 +8,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::bench::paths;
-use cuesta::bench::statistics::Percentiles;
-use cuesta::draw::DrawList;
-use cuesta::height::{self, Field, Options};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::bench::statistics::Percentiles;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{self, Field, Options};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::{Metric, Tolerance, View};
 
 /// Frames of a path.
 const FRAMES: usize = 48;

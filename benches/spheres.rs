@@ -6,25 +6,25 @@
 //! path's), as published. Also measured: selection time and bytes sent per frame with streamed triangles and with
 //! resident blocks.
 //!
-//! `cargo bench --no-default-features --bench spheres` on an idle machine; `-- 100000 leaping` runs that case alone.
+//! `cargo bench --no-default-features --features bench --bench spheres` on an idle machine; `-- 100000 leaping` runs that case alone.
 
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::draw::{DrawList, ExplicitVertex};
-use cuesta::height::progress::Progress;
-use cuesta::height::{Field, synth};
-use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
-use cuesta::lod::sphere_tree::covers::Covers;
-use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
-use cuesta::lod::sphere_tree::measure::Measured;
-use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
-use cuesta::lod::sphere_tree::roam::Queues;
-use cuesta::lod::sphere_tree::splits::{Found, Splits};
-use cuesta::lod::{self, Settings};
-use cuesta::texture::resolution::{level_by_exponent, level_by_logarithm};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::{DrawList, ExplicitVertex};
+use cuesta::internal::height::progress::Progress;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::sphere_tree::bounding_spheres::BoundingSpheres;
+use cuesta::internal::lod::sphere_tree::covers::Covers;
+use cuesta::internal::lod::sphere_tree::front::{CrossingTracker, Follower};
+use cuesta::internal::lod::sphere_tree::measure::Measured;
+use cuesta::internal::lod::sphere_tree::reach::{Reach, Viewpoint};
+use cuesta::internal::lod::sphere_tree::roam::Queues;
+use cuesta::internal::lod::sphere_tree::splits::{Found, Splits};
+use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::texture::resolution::{level_by_exponent, level_by_logarithm};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 /// Samples along a side, and metres between them.

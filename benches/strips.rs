@@ -2,16 +2,16 @@
 //! rendering.
 //!
 //! Their scene: 8 × 8 pages of 64 × 64 cells tiled over the plane, and a circle flown low above ground; one level
-//! scale per series. `cargo bench --no-default-features --bench strips` on an idle machine.
+//! scale per series. `cargo bench --no-default-features --features bench --bench strips` on an idle machine.
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::bench::paths;
-use cuesta::draw::DrawList;
-use cuesta::height::{Field, synth};
-use cuesta::lod::{self, Settings};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::view::{Metric, Tolerance, View};
 
 /// Timed frames of the circle, and repetitions of each.
 const FRAMES: usize = 50;

@@ -11,14 +11,13 @@ mod host;
 
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use ash::vk;
 use cuesta::embed::{DepthTarget, SelectionStats, Target, TerrainDescription, TerrainRenderer};
-use cuesta::height::demo;
-use cuesta::lod::{self, Settings};
-use cuesta::plan::{Colour, Look};
-use cuesta::view::{Lens, Metric, Tolerance, View};
-use glam::{DVec3, Vec4};
+use cuesta::glam::{DVec3, Vec4};
+use cuesta::offscreen::{Colour, Look};
+use cuesta::techniques::Techniques;
+use cuesta::{Lens, Metric, Tolerance, View, heights};
 
 use host::{Attachment, Host, Readback};
 
@@ -86,13 +85,12 @@ pub fn render(options: Options) -> Result<Outcome> {
     let look = Look { colour: Colour::Overlay, ..Look::default() };
     let host = Host::new(&TerrainRenderer::requirements(&target(options, None), &look))?;
     let renderer = Renderer::new(&host, options)?;
-    let field = Arc::new(demo::demo());
-    let entry = lod::find(options.technique).context("a technique")?;
+    let field = Arc::new(heights::demo());
     let description = TerrainDescription {
-        technique: entry.prepare(&field, &Settings::defaults(entry)).map_err(anyhow::Error::msg)?,
+        technique: Techniques::built_in().prepare(options.technique, &field).map_err(anyhow::Error::msg)?,
         field,
         look,
-        overlay: Some(&image::load_from_memory(demo::OVERLAY)?.into_rgba8()),
+        overlay: Some(&image::load_from_memory(include_bytes!("../assets/demo_overlay.jpg"))?.into_rgba8()),
         target: renderer.target,
         frames_in_flight: FRAMES_IN_FLIGHT,
     };

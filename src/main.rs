@@ -1,5 +1,7 @@
-//! The program.
+//! The program `cuesta`.
+
+use cuesta::internal::lod::Techniques;
 
 fn main() -> std::process::ExitCode {
-    cuesta::cli::main()
+    cuesta::internal::cli::main(&Techniques::built_in())
 }

@@ -4,7 +4,7 @@
 //! `cargo test --release -- --ignored write_seeds` writes the seeds.
 #![no_main]
 
-use cuesta::height::{Options, load_bytes_with};
+use cuesta::internal::height::{Options, load_bytes_with};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|input: &[u8]| {

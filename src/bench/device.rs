@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 
 use super::controller::ToleranceController;
 use super::paths::TIME_STEP_S;
@@ -16,7 +16,7 @@ use crate::draw::layout;
 use crate::draw::{DrawList, Geometry};
 use crate::gpu::Gpu;
 use crate::height::Field;
-use crate::lod::{self, Settings, Technique};
+use crate::lod::{Settings, Technique, TechniqueSpec, Techniques};
 use crate::measure::{economy, geometric, pop, watertight};
 use crate::plan::{self, Look, ScenePlan};
 use crate::scene::capture::AsDrawn;
@@ -31,14 +31,24 @@ const CAPTURED: u64 = 4_000_000;
 pub struct DeviceBackend {
     gpu: Arc<Gpu>,
     look: Look,
+    techniques: Techniques,
     /// The scene whose truths are kept, and they, by frame.
     truths: (String, BTreeMap<usize, Arc<Truth>>),
 }
 
 impl DeviceBackend {
-    /// On this device.
-    pub fn new(gpu: Arc<Gpu>, look: Look) -> Self {
-        Self { gpu, look, truths: Default::default() }
+    /// Draws with a look on a device; the cases name these techniques.
+    pub fn new(gpu: Arc<Gpu>, look: Look, techniques: Techniques) -> Self {
+        Self { gpu, look, techniques, truths: Default::default() }
+    }
+
+    fn build(&self, case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
+        let spec: TechniqueSpec = case.technique.parse().map_err(anyhow::Error::msg)?;
+        let entry = self.techniques.entry(&spec).map_err(anyhow::Error::msg)?;
+        let given: Vec<_> = case.settings.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
+        let settings = Settings::new(entry, spec.variant.as_deref(), &given);
+        let settings = settings.map_err(|e| anyhow!("{}: {e}", case.technique))?;
+        entry.prepare(field, &settings).map_err(anyhow::Error::msg)
     }
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
@@ -48,7 +58,7 @@ impl DeviceBackend {
 
     /// A freshly prepared technique and its renderer.
     fn set(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
-        let technique = build(scene.case, scene.field)?;
+        let technique = self.build(scene.case, scene.field)?;
         let plan = self.plan(scene.field, technique.as_ref())?;
         let renderer = self.scene(scene.field, &plan).renderer(technique.as_ref(), scene.case.size)?;
         Ok((technique, renderer))
@@ -75,15 +85,6 @@ impl DeviceBackend {
         }
         Ok(Arc::clone(&self.truths.1[&frame]))
     }
-}
-
-fn build(case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
-    let (name, variant) =
-        case.technique.split_once(':').map_or((case.technique.as_str(), None), |(name, variant)| (name, Some(variant)));
-    let entry = lod::find(name).with_context(|| format!("no technique {name}"))?;
-    let given: Vec<_> = case.settings.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
-    let settings = Settings::new(entry, variant, &given).map_err(|e| anyhow!("{}: {e}", case.technique))?;
-    entry.prepare(field, &settings).map_err(anyhow::Error::msg)
 }
 
 impl BenchBackend for DeviceBackend {

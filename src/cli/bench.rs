@@ -1,4 +1,4 @@
-//! `cuesta bench`: error against run time along named paths; `cuesta bench compare`: what changed.
+//! `cuesta bench`: error and run time along named paths. `cuesta bench compare`: the differences of two runs.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -19,33 +19,33 @@ use crate::bench::run::{Ended, Run};
 use crate::bench::{BenchBackend, SCHEMA};
 use crate::plan::Look;
 
-/// Arguments.
+/// Arguments of `cuesta bench`.
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct BenchArgs {
-    /// Something else than measuring.
+    /// Another action than measuring.
     #[command(subcommand)]
     pub action: Option<Action>,
-    /// What is measured.
+    /// Selection of fields, techniques and paths.
     #[command(flatten)]
     pub measure: MeasureArgs,
 }
 
-/// What can be done with measurements.
+/// Actions on finished benchmarks.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// What changed from one benchmark to another; exit code 1 if anything got worse.
+    /// Compare two benchmarks; exit code 1 if anything got worse.
     Compare(CompareArgs),
 }
 
-/// Two benchmarks.
+/// Arguments of `cuesta bench compare`.
 #[derive(Args, Debug)]
 pub struct CompareArgs {
-    /// Directory of the benchmark before.
+    /// Folder of the benchmark before.
     pub a: PathBuf,
-    /// Directory of the benchmark after.
+    /// Folder of the benchmark after.
     pub b: PathBuf,
-    /// What is no regression yet: 0.1 is a tenth.
+    /// Largest relative difference that counts as noise: 0.1 is 10 %.
     #[arg(long, value_name = "SHARE", default_value_t = THRESHOLD)]
     pub threshold: f64,
 }
@@ -76,11 +76,11 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
     Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Makes what draws. Every [`BenchScene`](crate::bench::Scene) that it is given is of a case that [`Planned`] made.
+/// Opens a device to draw the cases that [`Planned`] lists.
 #[cfg(feature = "vulkan")]
 fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
     let gpu = super::render::open(common, false)?;
-    Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look)))
+    Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look, common.techniques.clone())))
 }
 
 #[cfg(not(feature = "vulkan"))]
@@ -93,7 +93,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let mut backend = backend(common, args.ground.over(Look::default())?)?;
     let header = header(backend.as_mut(), &planned)?;
-    // The first Ctrl-C ends the run after the row at hand, the second at once; rows that are there are kept either way.
+    // The first Ctrl-C ends the run after the current row, the second one at once. Finished rows are kept either way.
     let stop = interrupt::flag();
     let run = Run {
         folder,
@@ -110,7 +110,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         bar.set_message(step.case.to_string());
     });
     bar.finish_and_clear();
-    // A page of the rows that are there is worth having, and no reason to hide why there are no more.
+    // The page shows the finished rows. Its failure must not hide the reason for missing ones.
     let page = crate::report::write(folder);
     let (ended, page) = (ended?, page?);
     let found = Results::read(folder)?;

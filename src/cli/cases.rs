@@ -1,117 +1,117 @@
-//! What `cuesta bench` was asked for, turned into fields and cases.
+//! Turns the arguments of `cuesta bench` into fields and cases.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Result, anyhow, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
 
 use super::common::Common;
 use super::scene::{GroundArgs, ReadArgs, key_value, size};
-use super::{endless, report};
+use super::{endless, report, technique};
 use crate::bench::goal::Goal;
 use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
-use crate::lod;
+use crate::lod::TechniqueSpec;
 
 /// Frames drawn before a path begins.
 const WARM_UP: usize = 5;
-/// About so many frames of a path are measured for errors.
+/// Number of frames of a path that are measured for errors, roughly.
 const MEASURED: usize = 12;
-/// The technique that draws every sample in every view, whatever the tolerance.
+/// The technique that draws every sample in every view at any tolerance.
 const TRUTH: &str = "brute-force";
 
-/// What is measured.
+/// Fields, techniques, tolerances and paths of a benchmark.
 #[derive(Args, Debug)]
 pub struct MeasureArgs {
-    /// Height files of any supported format, directories of web-map tiles, `demo`.
+    /// Height files of any supported format, folders of web-map tiles, or `demo`.
     #[arg(required_unless_present = "kit")]
     pub terrain: Vec<String>,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// Directory for rows, results, pictures and the report; a run that was stopped goes on.
+    /// Folder for rows, results, pictures and the report; a stopped run continues there.
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
-    /// Techniques, each `technique` or `technique:variant`, by default all; the first one is what times are divided by.
+    /// Techniques, each `technique` or `technique:variant`, by default all; times are relative to the first one.
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
-    pub technique: Vec<String>,
-    /// A setting, for every technique that has it; may be repeated. Of several values each is measured.
+    pub technique: Vec<TechniqueSpec>,
+    /// A setting, for every technique that has it; may be repeated. Each of several values is measured.
     #[arg(long = "set", value_name = "KEY=V,…", value_parser = key_value)]
     pub settings: Vec<(String, String)>,
-    /// Errors allowed, pixels.
+    /// Largest errors on the screen, pixels; each is measured.
     #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
     pub tolerance: Vec<f64>,
-    /// Triangles a frame to hold by moving the tolerance, which starts as the first one given; each is measured.
+    /// Triangles per frame to hold by moving the tolerance; starts at the first tolerance. Each is measured.
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub triangles: Vec<f64>,
-    /// Milliseconds a frame to hold in the same way.
+    /// Milliseconds per frame to hold by moving the tolerance; each is measured.
     #[arg(long, value_name = "MS,…", value_delimiter = ',')]
     pub frame_time: Vec<f64>,
     /// Paths to fly; the kit has its own.
     #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = path_help())]
     pub path: Vec<String>,
-    /// The meaning of a pixel of error.
+    /// Formula that converts metres of error to pixels.
     #[arg(long, value_enum, default_value_t = Choice::Certified)]
     pub metric: Choice,
-    /// Pixels; the kit has its own.
+    /// Size of the picture, pixels; the kit has its own.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Frames of a path; the kit has its own.
+    /// Frames per path; the kit has its own.
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
-    /// How often each case is timed.
+    /// Number of times that each case is timed.
     #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub rounds: u32,
-    /// What the ground is like from near, and a sun that moves.
+    /// Ground materials and a moving sun.
     #[command(flatten)]
     pub ground: GroundArgs,
-    /// The public benchmark kit; terrains that are given join it.
+    /// Run the public benchmark kit, on the terrains given too.
     #[arg(long)]
     pub kit: bool,
-    /// Of the kit, only the scenes whose name contains one of these, as in "peers-1 2049".
+    /// Run only the scenes of the kit with one of these in their name, as in "peers-1 2049".
     #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
     pub only: Vec<String>,
-    /// A quarter of the frames and two rounds: to see that all works, not to quote.
+    /// A quarter of the frames and two rounds: a smoke test, not for publication.
     #[arg(long)]
     pub quick: bool,
 }
 
-/// Which metrics are measured.
+/// The metrics to measure.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// A true bound for every pixel.
+    /// An upper bound for every pixel.
     Certified,
-    /// As published.
+    /// The formula of the paper.
     Paper,
-    /// One after the other.
+    /// Both, one after the other.
     Both,
 }
 
-/// What a run draws.
+/// The fields and cases of a run.
 pub struct Planned {
     /// The fields of all cases.
     pub fields: Vec<(Terrain, Arc<Field>)>,
     /// The cases.
     pub cases: Vec<Case>,
-    /// How often each is timed.
+    /// Number of times that each is timed.
     pub rounds: usize,
     /// Frames drawn before a path begins.
     pub warm_up: usize,
-    /// The technique that times are divided by.
+    /// The technique that times are relative to.
     pub base: String,
-    /// What makes two runs the same run, in words.
+    /// Arguments that two parts of one run share; a stopped run continues only under equal ones.
     pub arguments: Vec<String>,
 }
 
-/// The paths, for `--help`.
+/// Lists the paths for `--help`.
 pub fn path_help() -> String {
     let paths: Vec<_> = paths::PATHS.iter().map(|path| format!("{} ({})", path.name, path.about)).collect();
     format!("Paths to fly; the kit has its own: {}", paths.join(", "))
 }
 
-/// One technique as it was asked for.
+/// A requested technique with its settings.
 #[derive(Clone)]
 struct Asked {
     technique: String,
@@ -128,7 +128,10 @@ struct Flight {
 }
 
 impl Planned {
-    /// Reads and makes the fields and lists the cases.
+    /// Reads and synthesises the fields, and lists the cases.
+    ///
+    /// # Errors
+    /// If an argument is wrong or a file cannot be read.
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
         let asked = techniques(common, args)?;
         let numbers = [
@@ -157,38 +160,31 @@ impl Planned {
     }
 }
 
-/// The techniques asked for, checked; all of the table unless some are named.
+/// Checks the requested techniques; all of the table if none is named.
 fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
-    let all: Vec<String> = lod::TECHNIQUES.iter().map(|entry| entry.name.to_string()).collect();
-    let names = if args.technique.is_empty() { &all } else { &args.technique };
-    for (key, _) in &args.settings {
-        let has = |name: &String| entry(name).is_ok_and(|(entry, _)| entry.settings.iter().any(|s| s.key == key));
-        ensure!(names.iter().any(has), "--set {key}: no technique of this run has this setting");
+    let mut specs = args.technique.clone();
+    if specs.is_empty() {
+        specs = common.techniques.specs().into_iter().filter(|spec| spec.variant.is_none()).collect();
     }
-    Ok(names.iter().map(|name| asked(common, name, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
+    for (key, _) in &args.settings {
+        let has = |spec| common.techniques.entry(spec).is_ok_and(|entry| entry.settings.iter().any(|s| s.key == key));
+        ensure!(specs.iter().any(has), "--set {key}: no technique of this run has this setting");
+    }
+    Ok(specs.iter().map(|spec| asked(common, spec, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
-fn entry(name: &str) -> Result<(&'static lod::Entry, Option<&str>)> {
-    let (technique, variant) = name.split_once(':').map_or((name, None), |(t, v)| (t, Some(v)));
-    let entry = lod::find(technique).ok_or_else(|| {
-        let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
-        anyhow!("--technique {technique}: expected one of {}", known.join(", "))
-    })?;
-    Ok((entry, variant))
-}
-
-/// A technique once with each combination of the values of its settings.
-fn asked(common: &Common, name: &str, choices: &[(String, String)]) -> Result<Vec<Asked>> {
-    let (entry, variant) = entry(name)?;
+/// Returns a technique once for each combination of the values of its settings.
+fn asked(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) -> Result<Vec<Asked>> {
+    let entry = technique::entry(&common.techniques, spec)?;
     let mut all = vec![Vec::new()];
     for (key, values) in choices.iter().filter(|(key, _)| entry.settings.iter().any(|setting| setting.key == key)) {
         let with = |own: &Vec<(String, String)>, value: &str| [&own[..], &[(key.clone(), value.to_string())]].concat();
         all = all.iter().flat_map(|own| values.split(',').map(move |value| with(own, value))).collect();
     }
     let checked = |own: Vec<(String, String)>| {
-        let settings = super::technique::settings(entry, variant, &own)?;
+        let settings = technique::settings(entry, spec.variant.as_deref(), &own)?;
         report::warn_of_idle(common, entry, &settings);
-        Ok(Asked { technique: name.to_string(), settings: own.into_iter().collect() })
+        Ok(Asked { technique: spec.to_string(), settings: own.into_iter().collect() })
     };
     all.into_iter().map(checked).collect()
 }
@@ -250,14 +246,14 @@ fn of_files(
 }
 
 impl Flight {
-    /// A quarter of the frames, of which a few are measured.
+    /// Keeps a quarter of the frames, and measures about three of them.
     fn shorten(&mut self) {
         self.frames = self.frames.div_ceil(4);
         self.every = self.frames.div_ceil(3);
     }
 }
 
-/// The cases of a flight; what draws every sample is there once.
+/// Returns the cases of a flight. The technique that draws every sample has one case.
 fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     let metrics: &[&str] = match args.metric {
         Choice::Certified => &["certified"],
@@ -268,7 +264,7 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     let mut cases = Vec::new();
     for (metric, asked) in metrics.iter().flat_map(|metric| asked.iter().map(move |asked| (metric, asked))) {
         let is_truth = asked.technique == TRUTH;
-        // What is held starts from the first tolerance.
+        // A held goal starts from the first tolerance.
         let is_one = is_truth || !goals.is_empty();
         let tolerances = if is_one { &args.tolerance[..1] } else { &args.tolerance[..] };
         let goals: Vec<_> = if is_one && !is_truth { goals.iter().copied().map(Some).collect() } else { vec![None] };
@@ -292,19 +288,20 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     cases
 }
 
-/// What is to be held, if anything.
+/// Returns the budgets to hold.
 fn goals(args: &MeasureArgs) -> Vec<Goal> {
     let triangles = args.triangles.iter().map(|&count| Goal::Triangles(count));
     triangles.chain(args.frame_time.iter().map(|&ms| Goal::FrameMs(ms))).collect()
 }
 
-/// The choices of a run, whatever order and form they were given in.
+/// Describes the choices of a run, independent of their order and spelling.
 fn arguments(args: &MeasureArgs) -> Vec<String> {
     let joined = |values: &[String]| values.join(",");
+    let specs: Vec<_> = args.technique.iter().map(TechniqueSpec::to_string).collect();
     let tolerances: Vec<_> = args.tolerance.iter().map(f64::to_string).collect();
     let settings: Vec<_> = args.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
     let mut list = args.terrain.clone();
-    let techniques = if args.technique.is_empty() { "all".to_string() } else { joined(&args.technique) };
+    let techniques = if specs.is_empty() { "all".to_string() } else { joined(&specs) };
     let metric = format!("{:?}", args.metric).to_lowercase();
     list.push(format!("--technique {techniques} --tolerance {} --metric {metric}", joined(&tolerances)));
     if !settings.is_empty() {

@@ -2,34 +2,39 @@
 
 use clap::Args;
 
-/// Flags of every subcommand.
+use crate::lod::Techniques;
+
+/// Flags of every subcommand, and the techniques that `--technique` chooses from.
 #[derive(Args, Debug, Clone, Default)]
 pub struct Common {
-    /// One JSON document on stdout and nothing else there.
+    /// Print one JSON document on stdout and nothing else there.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Say only what was asked for.
+    /// Print no progress and no warnings.
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Vulkan device: part of its name, or `cpu` for a software device.
     #[arg(long, global = true, value_name = "NAME")]
     pub device: Option<String>,
-    /// Validation layers on; any message makes the exit code 1.
+    /// Turn validation layers on; any message makes the exit code 1.
     #[arg(long, global = true)]
     pub validate: bool,
-    /// Device memory runs out after N allocations, for testing.
+    /// For tests: fail every allocation of device memory after the first N.
     #[arg(long, global = true, value_name = "N")]
     pub allocations: Option<u64>,
-    /// The device is lost after N calls that would notice, for testing.
+    /// For tests: report the device as lost after N calls that can notice it.
     #[arg(long, global = true, value_name = "N")]
     pub lose_device: Option<u64>,
+    /// The techniques that `--technique` chooses from.
+    #[arg(skip)]
+    pub techniques: Techniques,
 }
 
 /// Outcome of a run that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything asked for was done: exit code 0.
+    /// Everything was done: exit code 0.
     Done,
-    /// A limit was missed — a crack, an error, a validation message — or not all was tried: exit code 1.
+    /// A limit was missed (a crack, an error, a validation message), or the run was stopped: exit code 1.
     LimitMissed,
 }

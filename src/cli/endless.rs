@@ -1,4 +1,4 @@
-//! The terrain named `endless`: a land that no samples are kept of.
+//! The procedural terrain named `endless`, without stored samples.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use anyhow::{Result, anyhow, bail};
 use crate::height::bezier::{Bezier, LAYERS};
 use crate::height::{Field, Footprint, Loaded, Options};
 
-/// The land called `endless` or `endless:SEED`, unless a file has that name.
+/// Returns the terrain named `endless` or `endless:SEED`, unless a file has that name.
 pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
     let rest = terrain.strip_prefix("endless").filter(|_| !Path::new(terrain).exists())?;
     let seed = match rest.strip_prefix(':') {
@@ -19,12 +19,12 @@ pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
     Some(seed.and_then(|seed| endless(terrain, seed, options)))
 }
 
-/// Whether this is [`named`] so.
+/// Returns true for the name of such a terrain.
 pub fn is_named(terrain: &str) -> bool {
     named(terrain, &Options::default()).is_some()
 }
 
-/// It is not read from a file, and nothing can be said about how.
+/// Makes the terrain. Options about samples do not apply to it and are refused.
 fn endless(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     let Options { max_samples, hole_fill, .. } = *options;
     if *options != (Options { max_samples, hole_fill, ..Options::default() }) {
@@ -43,7 +43,7 @@ fn endless(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     })
 }
 
-/// Refuses a land without samples for what looks at every sample.
+/// Refuses a terrain without samples.
 pub fn need_samples(field: &Field, what: &str) -> Result<()> {
     if field.procedural().is_some() {
         bail!("{what}: it looks at every sample, and this land has none");

@@ -1,4 +1,4 @@
-//! `cuesta export`: the as-drawn mesh of one view, in world metres.
+//! `cuesta export`: writes the drawn mesh of one view, in world metres.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -21,13 +21,13 @@ use crate::height::save::{Out, replace};
 use crate::height::surface::Corner;
 use crate::height::{Error, Field, surface};
 
-/// Arguments.
+/// Arguments of `cuesta export`.
 #[derive(Args, Debug)]
 pub struct ExportArgs {
-    /// Where heights come from.
+    /// The height data.
     #[command(flatten)]
     pub terrain: TerrainArgs,
-    /// Where to: .ply, .obj or .glb.
+    /// Output file: .ply, .obj or .glb.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// The view.
@@ -142,7 +142,7 @@ fn write_obj(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     Ok(())
 }
 
-/// glTF holds positions in f32: they are relative to a node whose translation is in f64.
+/// Writes glTF. Its positions are f32, relative to a node whose translation is f64.
 fn write_glb(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     let low = mesh.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
     let high = mesh.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();

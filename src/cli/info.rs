@@ -1,4 +1,4 @@
-//! `cuesta info`: what was read; the scene plan; the devices.
+//! `cuesta info`: describes height files, the scene plan, and the devices.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ pub use super::info_args::InfoArgs;
 use super::{plan, report, working_set};
 use crate::height::{Loaded, SourceFile};
 
-/// What was read.
+/// Description of a field.
 #[derive(Serialize)]
 pub struct Info {
     format: String,
@@ -27,13 +27,13 @@ pub struct Info {
     exact_in_16_bit: bool,
     /// Largest difference between the two ways to split a cell, metres.
     cell_ambiguity_m: f32,
-    /// The files that the heights come from; a later one overlies an earlier one.
+    /// The files with the heights; a later one overlies an earlier one.
     sources: Vec<SourceFile>,
     warnings: Vec<String>,
 }
 
 impl Info {
-    /// Describes a field that was read.
+    /// Describes a field.
     pub fn of(loaded: &Loaded) -> Self {
         let field = &loaded.field;
         let [width, height] = field.size();

@@ -1,5 +1,5 @@
-//! Ctrl-C. Work that can stop at a good place says how; the first Ctrl-C asks it to. Without such work, or the second
-//! time, the program ends at once: files that are not whole are removed, and none of them has its final name yet.
+//! Ctrl-C. The first one asks the current work to stop at a good place, if it can. Otherwise, or the second time, the
+//! program ends at once. Unfinished files have temporary names and are removed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -9,26 +9,26 @@ use signal_hook::low_level::exit;
 use super::report::note;
 use crate::height::save::discard_unfinished;
 
-/// Asks the work at hand to stop.
+/// A request to the current work to stop.
 pub type Ask = Box<dyn FnOnce() + Send>;
 
 static ASK: Mutex<Option<Ask>> = Mutex::new(None);
 
-/// From now on Ctrl-C does what this module says.
+/// Installs the handler of Ctrl-C.
 pub fn install() {
-    // Refused where the process has another handler, and that one is then asked.
+    // Fails if the process has another handler, which then stays.
     let _ = ctrlc::set_handler(|| {
         let ask = ASK.lock().unwrap_or_else(|e| e.into_inner()).take();
         ask.map_or_else(end, |ask| ask());
     });
 }
 
-/// What the next Ctrl-C does instead of ending the program.
+/// Replaces the effect of the next Ctrl-C.
 pub fn once(ask: Ask) {
     *ASK.lock().unwrap_or_else(|e| e.into_inner()) = Some(ask);
 }
 
-/// What the next Ctrl-C sets.
+/// Returns a flag that the next Ctrl-C sets.
 pub fn flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = Arc::clone(&flag);
@@ -36,7 +36,7 @@ pub fn flag() -> Arc<AtomicBool> {
     flag
 }
 
-/// Other threads are in the middle of something: nothing of the process is tidied up behind their backs.
+/// Ends the process without destructors: other threads are still at work.
 fn end() {
     discard_unfinished();
     note("error: stopped by Ctrl-C: what was not whole is not written");

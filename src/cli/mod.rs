@@ -1,4 +1,4 @@
-//! The program: one file a subcommand. Names and JSON fields are a contract for scripts.
+//! The program: one file per subcommand. Command names and JSON fields are stable, for scripts.
 
 pub mod bench;
 pub mod cases;
@@ -36,11 +36,13 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use common::{Common, Outcome};
 
-/// Large terrain drawn with a bounded error.
+use crate::lod::Techniques;
+
+/// Draws large terrain with a bounded error.
 #[derive(Parser, Debug)]
 #[command(name = "cuesta", version, about, args_override_self = true)]
 pub struct Cli {
-    /// What every subcommand takes.
+    /// Flags of every subcommand.
     #[command(flatten)]
     pub common: Common,
     /// The subcommand; without one, `view demo` on a display and `render demo -o cuesta.png` elsewhere.
@@ -51,46 +53,61 @@ pub struct Cli {
 /// The subcommands.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// What was read from a height file; devices; the scene plan.
+    /// Describe a height file, list devices, or explain the scene plan.
     Info(info::InfoArgs),
-    /// One picture.
+    /// Draw one picture.
     #[cfg(feature = "vulkan")]
     Render(render::RenderArgs),
-    /// Where a frame's time goes, draw by draw: tables and a trace.
+    /// Measure each draw of a frame: tables and a trace.
     #[cfg(feature = "vulkan")]
     Profile(profile::ProfileArgs),
-    /// The as-drawn mesh of one view: PLY, OBJ or GLB.
+    /// Write the mesh of one view as PLY, OBJ or GLB.
     Export(export::ExportArgs),
-    /// The window.
+    /// Open a window.
     #[cfg(feature = "viewer")]
     View(view::ViewerArgs),
-    /// Error against run time: every technique at every tolerance along named paths.
+    /// Measure error and run time of every technique at every tolerance along named paths.
     Bench(bench::BenchArgs),
-    /// The stability suite: every technique on stiff and extreme cases.
+    /// Run the stress suite: every technique on stiff and extreme cases.
     Stress(stress::StressArgs),
-    /// The report of a benchmark, drawn again from its rows.
+    /// Draw the report of a benchmark again from its rows.
     Report(redraw::ReportArgs),
-    /// A synthetic field.
+    /// Make a synthetic field.
     Synth(synth::SynthArgs),
 }
 
 impl Cli {
-    /// Parses a command line, the program's name first.
+    /// Parses a command line, the program's name first, with the built-in techniques.
+    ///
+    /// # Errors
+    /// If the command line is wrong, or asks for help or the version.
     pub fn parse_words(words: impl IntoIterator<Item: Into<OsString> + Clone>) -> Result<Self, clap::Error> {
-        let mut command = command();
+        Self::parse_with(words, &Techniques::built_in())
+    }
+
+    fn parse_with(
+        words: impl IntoIterator<Item: Into<OsString> + Clone>,
+        techniques: &Techniques,
+    ) -> Result<Self, clap::Error> {
+        let mut command = technique::with_names(command(), techniques);
         let matches = command.try_get_matches_from_mut(words)?;
-        Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+        let mut cli = Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+        cli.common.techniques = techniques.clone();
+        Ok(cli)
     }
 }
 
-/// Parses the command line and runs it. Failures and wrong use are one line on stderr and exit code 2.
-pub fn main() -> ExitCode {
+/// Runs the program `cuesta` on the process's command line, with these techniques. Returns its exit code.
+///
+/// 0: done. 1: a limit was missed. 2: wrong use or a failure, with one line on stderr. Replaces the panic hook and
+/// handles Ctrl-C.
+pub fn main(techniques: &Techniques) -> ExitCode {
     panic::set_hook(Box::new(fault));
     interrupt::install();
-    let outcome = match Cli::parse_words(std::env::args_os()) {
+    let outcome = match Cli::parse_with(std::env::args_os(), techniques) {
         Ok(cli) => match panic::catch_unwind(AssertUnwindSafe(|| run(cli))) {
             Ok(outcome) => outcome,
-            // The hook has told of it.
+            // The panic hook has printed it.
             Err(_) => return ExitCode::from(2),
         },
         Err(error) if !error.use_stderr() => report::say(error.to_string().trim_end()).map(|()| Outcome::Done),
@@ -106,7 +123,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What is wrong with a command line, in one line.
+/// Returns the error of a command line in one line.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines: Vec<_> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
@@ -114,7 +131,7 @@ pub fn one_line(error: &clap::Error) -> String {
     line.strip_prefix("error: ").map_or(line.clone(), str::to_string)
 }
 
-/// A fault of the program itself: where it is and what it says, in one line.
+/// Prints a panic in one line: source position and message.
 fn fault(info: &PanicHookInfo) {
     let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
     let said = info.payload_as_str().unwrap_or("no words").replace('\n', " ");
@@ -150,7 +167,7 @@ fn without_subcommand(common: &Common) -> Result<Outcome> {
     run_words(common, &["render", "demo", "-o", "cuesta.png"])
 }
 
-/// Runs a subcommand given as words, under the flags that were given.
+/// Runs a subcommand under the flags that were given.
 #[cfg(feature = "vulkan")]
 fn run_words(common: &Common, words: &[&str]) -> Result<Outcome> {
     let cli = Cli::parse_words(std::iter::once(&"cuesta").chain(words))?;
@@ -163,7 +180,7 @@ fn without_subcommand(_: &Common) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The command line's own description, for tests that hold documents against it.
+/// Returns clap's description of the command line. Tests compare documents with it.
 pub fn command() -> clap::Command {
     numbers::with_negative(Cli::command())
 }

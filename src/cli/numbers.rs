@@ -6,12 +6,11 @@ use clap::{Arg, Command};
 
 use crate::height;
 
-/// The farthest from the origin that anything is, and the longest that is asked for, metres: beyond it f64 cannot tell
-/// a tenth of a millimetre.
+/// Largest coordinate and largest length, metres: beyond it f64 cannot resolve a tenth of a millimetre.
 pub(super) const FARTHEST_M: f64 = 1e12;
-/// The shortest that is asked for, metres, and the finest tolerance, pixels.
+/// Smallest length, metres, and smallest tolerance, pixels.
 pub(super) const FINEST: f64 = 1e-9;
-/// What [`is_length`] takes.
+/// The lengths that [`is_length`] accepts.
 pub(super) const LENGTHS: &str = "1e-9 to 1e12 metres";
 
 pub(super) fn is_length(metres: f64) -> bool {

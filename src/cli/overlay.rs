@@ -10,10 +10,10 @@ use super::report;
 use crate::height::{Error, Field, Footprint, Located, Place, demo, place_of};
 use crate::texture::drape::Drape;
 
-/// The most texels of a picture, as of samples by default.
+/// Largest number of texels of a picture; the default for samples is the same.
 const MAX_TEXELS: u64 = 1 << 30;
 
-/// A picture, north up, and where its file says that it lies.
+/// A picture, north up, and its position according to its file.
 pub struct Picture {
     /// The texels.
     pub image: image::RgbaImage,
@@ -22,10 +22,13 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads a picture of any supported format, however large, within 2^30 texels.
+    /// Reads a picture of any supported format with up to 2^30 texels.
+    ///
+    /// # Errors
+    /// If the file is not a picture or is too large.
     pub fn read(path: &str) -> Result<Self> {
         let fail = |e: &dyn std::fmt::Display| Error::new(path, "picture", e);
-        // A pipe would wait for its writer to be opened.
+        // Opening a pipe would block until it has a writer.
         if !std::fs::metadata(path).map_err(|e| fail(&e))?.is_file() {
             return Err(fail(&"expected a file, found a folder or a device").into());
         }
@@ -36,7 +39,7 @@ impl Picture {
         if u64::from(width) * u64::from(height) > MAX_TEXELS {
             return Err(fail(&format!("expected at most 2^30 texels, found {width}x{height}")).into());
         }
-        // The texels are counted: bytes need no limit of their own.
+        // The number of texels is limited above, so that the decoder's limit in bytes is not needed.
         decoder.set_limits(image::Limits::no_limits()).map_err(|e| fail(&e))?;
         let mut image = image::DynamicImage::from_decoder(decoder).map_err(|e| fail(&e))?.into_rgba8();
         let located = place_of(Path::new(path), [width, height])?;
@@ -53,13 +56,13 @@ impl Picture {
         Ok(Self { image, file: path.to_string(), located })
     }
 
-    /// The picture of the embedded terrain.
+    /// Returns the picture of the embedded terrain.
     pub fn demo() -> Result<Self> {
         let image = image::load_from_memory(demo::OVERLAY).context("the embedded overlay")?.into_rgba8();
         Ok(Self { image, file: "demo".to_string(), located: Located::default() })
     }
 
-    /// The place of the picture over a field.
+    /// Returns the place of the picture over a field.
     ///
     /// # Errors
     /// If picture and field are of different coordinate systems.
@@ -86,9 +89,9 @@ impl Picture {
         Ok(drape)
     }
 
-    /// A warning about the coordinate systems of picture and terrain.
+    /// Returns a warning if the coordinate systems of picture and terrain differ.
     fn mismatch(&self, picture: &Place, terrain: &Place) -> Result<Option<String>> {
-        // The vertical part of a compound system is the terrain's alone.
+        // The vertical part of a compound system applies to the terrain alone.
         let horizontal = |place: &Place| place.crs.as_ref().map(|crs| crs.split('+').next().unwrap_or(crs).to_string());
         let (Some(own), Some(other)) = (horizontal(picture), horizontal(terrain)) else { return Ok(None) };
         let is_code = |crs: &str| crs.starts_with("EPSG:");
@@ -104,7 +107,7 @@ impl Picture {
     }
 }
 
-/// The place of a located picture, in samples of a located field. Texels and samples lie on the middle of their cells.
+/// Returns the place of a picture in samples of a field. Texels and samples lie at the centres of their cells.
 fn placed(picture: &Place, size: [u32; 2], terrain: &Place, field: &Field) -> Drape {
     let east = picture.origin[0] - picture.step[0] / 2.0 - terrain.origin[0];
     let south = terrain.origin[1] - (picture.origin[1] + picture.step[1] / 2.0);

@@ -1,4 +1,4 @@
-//! `cuesta info --plan`: what a scene needs on the device, what it leaves out, and what that saves.
+//! `cuesta info --plan`: the features that a scene needs on the device, those that it leaves out, and the savings.
 
 use std::sync::Arc;
 
@@ -14,16 +14,16 @@ use crate::height::{Field, Loaded};
 use crate::lod::Technique;
 use crate::plan::{Decision, Look, ScenePlan};
 
-/// What a scene keeps and leaves out, and what its technique prepared.
+/// Features that are kept and left out, and data that the technique did not prepare.
 #[derive(Serialize)]
 struct Plan {
     technique: &'static str,
     kept: Vec<Decision>,
     left_out: Vec<LeftOut>,
-    /// What the technique did not prepare for this field.
+    /// Data that the technique did not prepare for this field.
     omitted: Vec<Unprepared>,
     stats: Vec<Figure>,
-    /// All that is kept, measured.
+    /// Measurement with all features kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole>,
 }
@@ -32,7 +32,7 @@ struct Plan {
 struct LeftOut {
     feature: &'static str,
     reason: String,
-    /// Device bytes; where it was measured, as measured.
+    /// Device bytes, measured where `measured` exists.
     bytes_saved: i64,
     #[serde(flatten)]
     measured: Option<Saved>,
@@ -45,14 +45,14 @@ struct Unprepared {
     bytes_saved: u64,
 }
 
-/// What the feature would take beside the bytes.
+/// Measured cost of a feature beside its bytes.
 #[derive(Serialize)]
 struct Saved {
     pipelines_saved: i64,
     instructions_saved: i64,
-    /// The device's time for a frame with it, as a ratio to that without.
+    /// Device time for a frame with the feature, relative to that without.
     time_with: f64,
-    /// Pixels that differ with it, and by how much at most, of 255.
+    /// Number of pixels that differ with it, and the largest difference, of 255.
     pixels_changed: usize,
     largest_change: u8,
 }
@@ -76,7 +76,7 @@ struct Figure {
 pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> Result<Outcome> {
     let field = &Arc::new(loaded.field);
     let (look, overlay) = args.look.build(common, terrain, (field, &loaded.footprint))?;
-    let (entry, _) = args.technique.settings()?;
+    let (entry, _) = args.technique.settings(&common.techniques)?;
     let technique = args.technique.build(common, field)?;
     let (plan, savings) = plan(common, args, (field, &look, overlay.as_ref()), technique.as_ref())?;
     let (kept, left_out) = plan.decisions(field, Some(&technique.device_geometry()));
@@ -100,10 +100,10 @@ impl From<Decision> for LeftOut {
     }
 }
 
-/// Field, look, and the picture laid over.
+/// Field, look, and the overlay.
 type Scenery<'a> = (&'a Arc<Field>, &'a Look, Option<&'a image::RgbaImage>);
 
-/// All that is kept, and for each feature that is left out what it would take.
+/// Measurement with all features kept, and the cost of each feature that is left out.
 type Measured = (Whole, Vec<(&'static str, i64, Saved)>);
 
 #[cfg(feature = "vulkan")]
@@ -137,7 +137,7 @@ fn plan(
     Ok((plan, Some((whole, savings.into_iter().map(saved).collect()))))
 }
 
-/// Without Vulkan, plans are made for what every desktop device has.
+/// Without Vulkan, a plan assumes the limits of a common desktop device.
 #[cfg(not(feature = "vulkan"))]
 fn plan(
     _: &Common,

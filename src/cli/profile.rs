@@ -1,4 +1,4 @@
-//! `cuesta profile`: where a frame's time goes, draw by draw, and the ways to submit it side by side.
+//! `cuesta profile`: the time of each draw of a frame, and the modes of submission side by side.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,19 +21,19 @@ use crate::profile::run::Measured;
 use crate::profile::{self, Form, Profile, files, rows, table};
 use crate::scene::Scene;
 
-/// Arguments.
+/// Arguments of `cuesta profile`.
 #[derive(Args, Debug)]
 pub struct ProfileArgs {
-    /// Where heights come from.
+    /// The height data.
     #[command(flatten)]
     pub terrain: TerrainArgs,
     /// Folder for trace.json, profile.json, passes.csv, draws.csv and modes.csv.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Frames behind each median.
+    /// Frames per median.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
-    /// Capture the frame of the slowest mode, if RenderDoc is loaded.
+    /// Capture a frame of the slowest mode, if RenderDoc is loaded.
     #[arg(long)]
     pub renderdoc: bool,
     /// The view.
@@ -47,7 +47,7 @@ pub struct ProfileArgs {
     pub look: LookArgs,
 }
 
-/// `profile.json`.
+/// The document `profile.json`.
 #[derive(Serialize)]
 struct Document {
     schema: u32,
@@ -68,7 +68,7 @@ struct Document {
     validation_messages: Vec<String>,
 }
 
-/// What RenderDoc captured.
+/// A capture by RenderDoc.
 #[derive(Serialize)]
 struct Capture {
     mode: String,
@@ -100,7 +100,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
         schema: rows::SCHEMA,
         program: format!("cuesta {}", env!("CARGO_PKG_VERSION")),
         terrain: args.terrain.name(),
-        technique: args.technique.technique.clone(),
+        technique: args.technique.technique.to_string(),
         metric: args.technique.metric.name(),
         tolerance_px: view.tolerance.px,
         size: view.size,
@@ -121,9 +121,9 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     Ok(if document.validation_messages.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// The technique as it was asked for, and then its other forms under the same settings.
+/// Returns the requested form of the technique, and then its other variants under the same settings.
 fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<Form>> {
-    let (entry, chosen) = args.technique.settings()?;
+    let (entry, chosen) = args.technique.settings(&common.techniques)?;
     report::warn_of_idle(common, entry, &chosen);
     let variants = std::iter::once(None).chain(entry.variants.iter().map(|variant| Some(variant.name)));
     let mut variants: Vec<_> = variants.collect();

@@ -1,4 +1,4 @@
-//! `cuesta report`: draws the report of a benchmark or of a stability suite again, from its rows alone.
+//! `cuesta report`: draws the report of a benchmark or of the stress suite again from its rows.
 
 use std::path::PathBuf;
 
@@ -11,10 +11,10 @@ use super::report;
 use crate::bench::results;
 use crate::stress::rows;
 
-/// Arguments.
+/// Arguments of `cuesta report`.
 #[derive(Args, Debug)]
 pub struct ReportArgs {
-    /// Directory of a benchmark or of a stability suite.
+    /// Folder of a benchmark or of the stress suite.
     pub folder: PathBuf,
 }
 

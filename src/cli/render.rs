@@ -1,4 +1,4 @@
-//! `cuesta render`: one picture, and with `--measure` the error of what was really drawn.
+//! `cuesta render`: draws one picture; `--measure` adds the error of the triangles that were drawn.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,13 +25,13 @@ use crate::scene::{RenderResult, Scene};
 use crate::texture::virtual_overlay;
 use crate::view::{Metric, View};
 
-/// Arguments.
+/// Arguments of `cuesta render`.
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// Where heights come from.
+    /// The height data.
     #[command(flatten)]
     pub terrain: TerrainArgs,
-    /// The picture: .png.
+    /// Output file: .png.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// The view.
@@ -43,13 +43,13 @@ pub struct RenderArgs {
     /// The look.
     #[command(flatten)]
     pub look: LookArgs,
-    /// Seconds since the sun stood where `--sun` says.
+    /// Time of the scene for a moving sun, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub time: f64,
-    /// Draw it so often and report the median times.
+    /// Draw N times and report the median times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeat: u32,
-    /// Measure the error of what was drawn, prove it watertight, count hole and skirt pixels.
+    /// Measure the error, prove the surface watertight, and count hole and skirt pixels.
     #[arg(long)]
     pub measure: bool,
 }
@@ -67,7 +67,7 @@ struct Rendered {
     commands: usize,
     batches: usize,
     levels: Vec<usize>,
-    /// What the tolerance was multiplied by because there was too much to draw: 1 where it was kept.
+    /// Factor on the tolerance where the list would have exceeded its limits; 1 where the tolerance was kept.
     #[serde(serialize_with = "extended::serialize")]
     tolerance_scale: f64,
     prepare_ms: f64,
@@ -75,7 +75,7 @@ struct Rendered {
     record_ms: f64,
     gpu_ms: f64,
     device_bytes: u64,
-    /// What is there of a picture laid over that exceeds the memory for it.
+    /// Tiles of an overlay that exceeds the texture memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     texture_maps: Option<virtual_overlay::VirtualTextureStats>,
     validation_messages: Vec<String>,
@@ -91,14 +91,17 @@ struct Measured {
     /// The first few, from the top left corner.
     hole_pixels_at: Vec<[usize; 2]>,
     skirt_pixels: usize,
-    /// Triangles of skirts that are drawn, beside those of the surface.
+    /// Triangles of skirts, beside those of the surface.
     skirt_triangles: usize,
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     counter_example: Option<String>,
 }
 
-/// The device that the command line asks for.
+/// Opens the device that the command line names.
+///
+/// # Errors
+/// If there is none, or Vulkan fails.
 pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
     let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)?;
     gpu.limit_allocations(common.allocations.unwrap_or(u64::MAX));
@@ -106,7 +109,7 @@ pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
     Ok(gpu)
 }
 
-/// The choice of device on the command line.
+/// Returns the choice of device on the command line.
 pub fn choice(common: &Common) -> Choice {
     match common.device.as_deref() {
         None => Choice::Best,
@@ -151,7 +154,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
         over || m.hole_pixels > 0 || !m.watertight
     });
     let rendered = Rendered {
-        technique: args.technique.technique.clone(),
+        technique: args.technique.technique.to_string(),
         metric: if view.tolerance.metric == Metric::Certified { "certified" } else { "paper" },
         tolerance_px: view.tolerance.px,
         size: view.size,

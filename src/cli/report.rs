@@ -1,5 +1,5 @@
-//! What a subcommand says: JSON on stdout if asked for, else lines; progress and warnings on stderr. Whoever reads may be
-//! gone (`| head`): what is said then is said to nobody, and the work goes on.
+//! Output of the subcommands: JSON or lines on stdout, progress and warnings on stderr. A closed pipe (`| head`) is no
+//! error: the work goes on.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Write};
@@ -18,10 +18,10 @@ use crate::height::save::replace;
 use crate::lod::{Entry, Settings};
 use crate::renamed;
 
-/// A line on stdout.
+/// Prints a line on stdout.
 ///
 /// # Errors
-/// Where there is no room for it; not where nobody reads.
+/// If writing fails, except to a closed pipe.
 pub fn say(line: impl fmt::Display) -> Result<()> {
     match writeln!(io::stdout().lock(), "{line}") {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -29,12 +29,12 @@ pub fn say(line: impl fmt::Display) -> Result<()> {
     }
 }
 
-/// A line on stderr; where that cannot be written there is no one left to tell.
+/// Prints a line on stderr; ignores a failure to write.
 pub fn note(line: impl fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "{line}");
 }
 
-/// Prints a result: as one JSON document, or one line a field.
+/// Prints a result as one JSON document, or one line per field.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
     let mut value = serde_json::to_value(result)?;
     if common.json {
@@ -70,14 +70,14 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// Says something that is no failure, on stderr.
+/// Prints a warning on stderr.
 pub fn warn(common: &Common, text: &str) {
     if !common.quiet {
         note(format_args!("warning: {text}"));
     }
 }
 
-/// Warns if a list was made under another tolerance than the view's, by its scale.
+/// Warns if the tolerance of a list was scaled.
 pub fn warn_of_tolerance(common: &Common, scale: f64) {
     if scale == f64::INFINITY {
         warn(common, "there is too much to draw in this view: no tolerance is kept (larger blocks or tiles hold more)");
@@ -86,12 +86,12 @@ pub fn warn_of_tolerance(common: &Common, scale: f64) {
     }
 }
 
-/// Tells of settings that do nothing beside the others.
+/// Warns of settings without effect.
 pub fn warn_of_idle(common: &Common, entry: &Entry, settings: &Settings) {
     settings.idle(entry).iter().for_each(|idle| warn(common, &format!("--set {idle}")));
 }
 
-/// As [`spinner`] for a technique, with the share that is done as soon as there is one.
+/// Shows a spinner for a technique, with its progress once it is known.
 pub fn preparing(common: &Common, what: &str, progress: &Progress) -> ProgressBar {
     let bar = spinner(common, format!("preparing {what}"));
     let progress = progress.clone();
@@ -104,7 +104,7 @@ pub fn preparing(common: &Common, what: &str, progress: &Progress) -> ProgressBa
     bar
 }
 
-/// Shows on a terminal that something takes long; gone when dropped.
+/// Shows a spinner on a terminal until it is dropped.
 pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
     let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
     bar.set_message(what.into());
@@ -112,7 +112,7 @@ pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
     bar
 }
 
-/// Writes a picture's colours, or leaves the file that was there.
+/// Writes the colours of a picture. Keeps an existing file if writing fails.
 pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
     let rgb = image::DynamicImage::from(picture.clone()).into_rgb8();
     let written = replace(path, |out| rgb.write_to(out, image::ImageFormat::Png).map_err(std::io::Error::other));

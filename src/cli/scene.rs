@@ -1,4 +1,4 @@
-//! What the command line says about terrain, view, technique and look, turned into the things themselves.
+//! Arguments for terrain, view, technique and look, and the values built from them.
 
 use std::path::Path;
 
@@ -19,137 +19,136 @@ use crate::height::{Encoding, Field, Footprint, HoleFill, Loaded, Options, RawLa
 use crate::plan::{Colour, Forced, Look};
 use crate::view::{Lens, Tolerance, View, default_near};
 
-/// Where heights come from.
+/// Height data on the command line.
 #[derive(Args, Debug, Clone)]
 pub struct TerrainArgs {
-    /// Height files of any supported format, or folders of them, as one field; a directory of web-map tiles; `demo`; or
-    /// `endless[:SEED]`. Where several files have data the last one counts.
+    /// Height files of any supported format, or folders of them, as one field; a folder of web-map tiles; `demo`; or
+    /// `endless[:SEED]`. Where files overlap, the last one counts.
     #[arg(required = true)]
     pub terrain: Vec<String>,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
 }
 
-/// How heights are read.
+/// Options for reading heights.
 #[derive(Args, Debug, Clone)]
 pub struct ReadArgs {
-    /// Distance of neighbouring samples, metres, instead of what the file says.
+    /// Distance of neighbouring samples, metres; overrides the file.
     #[arg(long, value_name = "DX[,DZ]", value_parser = spacing)]
     pub spacing: Option<[f64; 2]>,
-    /// Multiplies every height.
+    /// Factor on every height.
     #[arg(long, value_name = "S")]
     pub height_scale: Option<f64>,
-    /// Added to every height, metres; after the scale.
+    /// Added to every height after the factor, metres.
     #[arg(long, value_name = "M", allow_negative_numbers = true, default_value_t = 0.0)]
     pub height_offset: f64,
-    /// The value that means "no data", instead of what the file says.
+    /// Value that means "no data"; overrides the file.
     #[arg(long, value_name = "V", value_parser = nodata)]
     pub nodata: Option<f64>,
-    /// The file is bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
+    /// Read the file as bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
     #[arg(long, value_name = "LAYOUT")]
     pub raw: Option<RawLayout>,
-    /// A ceiling over the field, read alike: together they are a cave, with rock where the ceiling is not above the
-    /// floor. For sorted-strips.
+    /// A ceiling over the field; both together are a cave. Where the ceiling is not above the floor there is rock. Needs
+    /// sorted-strips.
     #[arg(long, value_name = "FILE")]
     pub ceiling: Option<String>,
-    /// The part to keep, in samples.
+    /// Part to keep, samples.
     #[arg(long, value_name = "X,Z,W,H", value_parser = numbers::<u32, 4>)]
     pub crop: Option<[u32; 4]>,
     /// Repeat the field.
     #[arg(long, value_name = "NX,NZ", value_parser = numbers::<u32, 2>)]
     pub tile: Option<[u32; 2]>,
-    /// What is done with samples without data: no (they stay holes) or interpolate.
+    /// Treatment of samples without data: no (they stay holes) or interpolate.
     #[arg(long, value_name = "HOW", default_value = "no", value_parser = hole_fill)]
     pub hole_fill: HoleFill,
-    /// How a colour picture encodes heights: terrarium or mapbox.
+    /// Encoding of heights in a colour picture: terrarium or mapbox.
     #[arg(long, value_name = "E", value_parser = encoding)]
     pub encoding: Option<Encoding>,
-    /// The band to read of a file of several, from 1.
+    /// Band to read, from 1.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub band: Option<u32>,
-    /// Zoom level of a tile directory.
+    /// Zoom level of a folder of tiles.
     #[arg(long)]
     pub zoom: Option<u32>,
-    /// Files that claim more samples are refused.
+    /// Refuse files with more samples.
     #[arg(long, value_name = "N", default_value_t = 1 << 30)]
     pub max_samples: u64,
-    /// Keep nothing beside a large file of what took long to work out of it.
+    /// Keep no cache beside a large file.
     #[arg(long)]
     pub no_cache: bool,
 }
 
-/// Where the eye is and how it projects.
+/// Eye and projection.
 #[derive(Args, Debug, Clone)]
 pub struct ViewArgs {
     /// Position of the eye, world metres; Y may be +H, height above ground.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub eye: Option<String>,
-    /// The point to look at, world metres.
+    /// Point to look at, world metres.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch"])]
     pub look: Option<String>,
     /// Heading, degrees: 0 = east, 90 = south.
     #[arg(long, value_name = "D")]
     pub yaw: Option<f64>,
-    /// Degrees above the horizon.
+    /// Pitch, degrees above the horizon.
     #[arg(long, value_name = "D")]
     pub pitch: Option<f64>,
-    /// Degrees clockwise.
+    /// Roll, degrees clockwise.
     #[arg(long, value_name = "D", default_value_t = 0.0)]
     pub roll: f64,
     /// Horizontal field of view, degrees.
     #[arg(long, value_name = "D", default_value_t = 60.0)]
     pub fov: f64,
-    /// Pixels.
+    /// Size of the picture, pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Near plane, metres; by default a thousandth of the height above ground, at least 0.1 m (less on a terrain of less
-    /// than 20 m).
+    /// Near plane, metres; default: 1/1000 of the height above ground, at least 0.1 m (less on terrain below 20 m across).
     #[arg(long, value_name = "M")]
     pub near: Option<f64>,
-    /// Orthographic, with a picture this many metres wide.
+    /// Orthographic projection, with a picture this many metres wide.
     #[arg(long, value_name = "M")]
     pub ortho: Option<f64>,
 }
 
-/// How the land looks.
+/// Colours, light and overlay.
 #[derive(Args, Debug, Clone)]
 pub struct LookArgs {
-    /// What colours say; `overlay` if a picture is given, else `height`.
+    /// Colour of the terrain; default: `overlay` if a picture is given, else `height`.
     #[arg(long, value_enum)]
     pub colour: Option<Colour>,
-    /// A picture laid over the field: where its GeoTIFF tags or its world file say, else over all of the file's samples.
+    /// Picture laid over the field, placed by its GeoTIFF tags or world file; without them, over all samples of the file.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
-    /// Device memory for the overlay, or for the texels of `--colour ground`, megabytes: what is larger is there in parts,
-    /// finer where they are seen.
+    /// Device memory for the overlay or for `--colour ground`, megabytes. A larger texture is streamed in tiles, finer near
+    /// the eye.
     #[arg(long, value_name = "MB", default_value_t = 1100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
     #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>)]
     pub sun: Option<[f64; 2]>,
-    /// Optical density of the fog per metre.
+    /// Optical density of the fog, per metre.
     #[arg(long, value_name = "DENSITY", default_value_t = 0.0)]
     pub fog: f64,
-    /// Edges only.
+    /// Draw edges only.
     #[arg(long)]
     pub wireframe: bool,
-    /// What the ground is like from near, and a sun that moves.
+    /// Ground materials, a moving sun, and forced features.
     #[command(flatten)]
     pub ground: GroundArgs,
 }
 
-/// What the ground is like from near, a sun that moves, and features by hand.
+/// Ground materials, a moving sun, and forced features.
 #[derive(Args, Debug, Clone)]
 pub struct GroundArgs {
-    /// Show grass, rock, scree and snow from near, by slope and height.
+    /// Show grass, rock, scree and snow near the eye, by slope and height.
     #[arg(long)]
     pub detail: bool,
-    /// Degrees by which the sun's azimuth goes on a second: of the window's time, of a path's at 60 frames a second, of
-    /// `--time` in a picture.
+    /// Speed of the sun's azimuth, degrees per second: of the window's time, of a path at 60 frames per second, or of
+    /// `--time` for a picture.
     #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0)]
     pub sun_speed: f64,
-    /// Keep features that the scene does not need: see `info --plan`.
+    /// Keep features that the scene does not need; `info --plan` lists them.
     #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
     pub keep: Vec<String>,
     /// Leave features out.
@@ -158,7 +157,10 @@ pub struct GroundArgs {
 }
 
 impl GroundArgs {
-    /// A look with it.
+    /// Returns a look with these options.
+    ///
+    /// # Errors
+    /// If a feature is unknown or the speed is not finite.
     pub fn over(&self, look: Look) -> Result<Look> {
         if !self.sun_speed.is_finite() {
             bail!("--sun-speed {}: expected degrees a second", self.sun_speed);
@@ -208,7 +210,10 @@ fn encoding(text: &str) -> Result<Encoding, String> {
 }
 
 impl ReadArgs {
-    /// Reads a field, and the ceiling over it if there is one, and says what the reader warns of.
+    /// Reads a field and its ceiling, if there is one, and prints the reader's warnings.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
     pub fn load(&self, common: &Common, terrain: &[String]) -> Result<Loaded> {
         let mut loaded = self.load_alone(common, terrain)?;
         if let Some(file) = &self.ceiling {
@@ -253,18 +258,21 @@ impl ReadArgs {
 }
 
 impl TerrainArgs {
-    /// Reads the field, and says what the reader warns of.
+    /// Reads the field and prints the reader's warnings.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
     pub fn load(&self, common: &Common) -> Result<Loaded> {
         self.reading.load(common, &self.terrain)
     }
 
-    /// The names of all files, as on the command line.
+    /// Returns all names, as on the command line.
     pub fn name(&self) -> String {
         self.terrain.join(" ")
     }
 }
 
-/// What the embedded picture's pixels mean, unless the user says otherwise.
+/// Returns the spacing and the scale of the embedded picture; the user's options take precedence.
 fn demo_options(options: Options) -> Options {
     Options {
         spacing: options.spacing.or(Some([demo::SPACING; 2])),
@@ -275,12 +283,15 @@ fn demo_options(options: Options) -> Options {
 }
 
 impl LookArgs {
-    /// Device memory for textures that are there in parts, bytes.
+    /// Returns the device memory for streamed textures, bytes.
     pub fn texture_bytes(&self) -> u64 {
         1_000_000 * self.texture_memory
     }
 
-    /// The look of a field that was read from `terrain`, and the picture it lays over.
+    /// Returns the look of a field that was read from `terrain`, and its overlay.
+    ///
+    /// # Errors
+    /// If an option is wrong or the overlay cannot be read.
     pub fn build(
         &self,
         common: &Common,
@@ -304,7 +315,10 @@ impl LookArgs {
         Ok((self.ground.over(look)?, picture.map(|picture| picture.image)))
     }
 
-    /// The same for a window: the picture is there whatever the colours say at first.
+    /// Returns the look and the overlay for a window, where the user may switch to the overlay later.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
     pub fn build_for_window(
         &self,
         common: &Common,
@@ -320,7 +334,7 @@ impl LookArgs {
         Ok((Look { drape, ..look }, picture))
     }
 
-    /// The picture that colours need.
+    /// Returns the overlay that the colours need.
     fn picture(&self, terrain: &str, colour: Colour) -> Result<Option<Picture>> {
         match (&self.overlay, colour) {
             (Some(path), Colour::Overlay | Colour::Maps) => Ok(Some(Picture::read(path)?)),
@@ -332,7 +346,10 @@ impl LookArgs {
 }
 
 impl ViewArgs {
-    /// The view of a field; where nothing is said, a three-quarter view of all of it.
+    /// Returns the view of a field; by default a three-quarter view of all of it.
+    ///
+    /// # Errors
+    /// If a number is out of range.
     pub fn build(&self, field: &Field, tolerance: Tolerance) -> Result<View> {
         if !(self.fov > 0.0 && self.fov < 180.0) {
             bail!("--fov {}: expected degrees between 0 and 180", self.fov);
@@ -364,7 +381,7 @@ impl ViewArgs {
     }
 }
 
-/// A position `X,Y,Z`, where Y may be `+H`, a height above the ground.
+/// Parses a position `X,Y,Z`, where Y may be `+H`, a height above the ground.
 fn position(flag: &str, text: &str, field: &Field) -> Result<DVec3> {
     let parts: Vec<_> = text.split(',').map(str::trim).collect();
     let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, 1e12 at most, Y possibly +H above ground");

@@ -1,4 +1,4 @@
-//! Several files and folders named as one terrain.
+//! Several files and folders as one terrain.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 
 use super::endless;
 
-/// The one name, if it is one; several are files and folders.
+/// Returns the name if there is only one. Of several, each must be a file or a folder.
 pub fn only(terrain: &[String]) -> Result<Option<&str>> {
     if let [only] = terrain {
         return Ok(Some(only));
@@ -17,7 +17,7 @@ pub fn only(terrain: &[String]) -> Result<Option<&str>> {
     }
 }
 
-/// The path beside which a cache of the field lies: that of its file, or of the first one with the count of the rest.
+/// Returns the path of the field's cache: beside its file, or beside the first one with the number of the others.
 pub fn cache_path(terrain: &[String]) -> String {
     match terrain {
         [only] => only.clone(),
@@ -26,7 +26,7 @@ pub fn cache_path(terrain: &[String]) -> String {
     }
 }
 
-/// Whether it is the embedded terrain, which has an overlay of its own.
+/// Returns true for the embedded terrain, which has an overlay of its own.
 pub(super) fn is_demo(terrain: &str) -> bool {
     terrain == "demo" && !Path::new(terrain).exists()
 }

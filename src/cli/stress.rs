@@ -1,4 +1,4 @@
-//! `cuesta stress`: the stability suite.
+//! `cuesta stress`: runs the stress suite.
 
 use std::path::{Path, PathBuf};
 
@@ -13,28 +13,28 @@ use crate::stress::{
     self, Case, CaseRun, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, jitter, rows, saved, stiff,
 };
 
-/// Where counter-examples go if nothing else is said.
+/// Default folder for counter-examples.
 const FOLDER: &str = "cuesta-stress";
 
-/// Arguments.
+/// Arguments of `cuesta stress`.
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// Only this family: data, position, view, time, arithmetic, stiff, file or sweep; may be repeated.
+    /// Run only this family: data, position, view, time, arithmetic, stiff, file or sweep; may be repeated.
     #[arg(long, value_name = "F")]
     pub family: Vec<String>,
-    /// Only cases with this in their name; may be repeated.
+    /// Run only cases with this in their name; may be repeated.
     #[arg(long, value_name = "NAME")]
     pub case: Vec<String>,
-    /// Only this technique, or technique:variant; may be repeated.
+    /// Run only this technique, or technique:variant; may be repeated.
     #[arg(long, value_name = "T")]
     pub technique: Vec<String>,
-    /// Folder for stress.json, index.html and pictures; counter-examples go to cuesta-stress if it is not given.
+    /// Folder for stress.json, index.html and pictures; without it, counter-examples go to cuesta-stress.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Draw nothing on a device.
+    /// Use no device.
     #[arg(long)]
     pub no_device: bool,
-    /// Say which cases there are.
+    /// List the cases.
     #[arg(long)]
     pub list: bool,
 }
@@ -46,7 +46,7 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
         cases.iter().try_for_each(|case| report::say(format_args!("{}: {}", case.family, case.name)))?;
         return Ok(Outcome::Done);
     }
-    let mut trials = stress::case_runs(&cases, &args.technique).map_err(anyhow::Error::msg)?;
+    let mut trials = stress::case_runs(&cases, &common.techniques, &args.technique).map_err(anyhow::Error::msg)?;
     if !args.technique.is_empty() {
         trials.retain(|trial| !matches!(trial.case.kind, Kind::Standalone(..)) || !args.family.is_empty());
     }
@@ -71,15 +71,15 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
     let ended = found.ended;
     let mut stress = Stress { schema: SCHEMA, program, device: name, ended, cases: rows, pictures: Vec::new() };
     let kept = args.out.as_ref().map_or(Ok(()), |folder| keep(folder, &mut stress));
-    // What was found is said, whatever becomes of its files.
+    // Findings are printed even if their files cannot be written.
     say(common, &stress)?;
     kept?;
     let [_, failed] = stress.counts();
-    // What was not tried has not passed.
+    // A stopped run has not passed.
     Ok(if failed == 0 && stress.ended.is_none() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// The cases asked for.
+/// Returns the selected cases.
 fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
     let families: Vec<_> = stress::FAMILIES.iter().filter_map(|cases| Some(cases.first()?.family)).collect();
     if let Some(unknown) = args.family.iter().find(|family| !families.contains(&family.as_str())) {
@@ -111,7 +111,7 @@ fn row(
     checker: Option<&mut dyn ImageChecker>,
 ) -> Row {
     let finite = |value: f64| value.is_finite().then_some(value);
-    // A row is worth more than its counter-example.
+    // A failure to write the counter-example must not lose the row.
     let files = counter_example(folder, trial, finding, checker).unwrap_or_else(|error| {
         report::warn(common, &format!("no counter-example: {error:#}"));
         Vec::new()
@@ -204,7 +204,7 @@ fn line(row: &Row) -> String {
     format!("{verdict}  {family}: {name}, {technique}: {check}: {} of {}{why}", number(*value), number(*limit))
 }
 
-/// The device that draws, if there is one and it is wanted.
+/// The device, if one is present and not switched off.
 #[cfg(feature = "vulkan")]
 struct Device(Option<(String, stress::device::DeviceImageChecker)>);
 
@@ -231,13 +231,13 @@ impl Device {
         self.0.as_mut().map(|(_, checker)| checker as &mut dyn ImageChecker)
     }
 
-    /// Its name, and validation messages.
+    /// Closes the device. Returns its name and validation messages.
     fn close(self) -> (Option<String>, Vec<String>) {
         self.0.map_or((None, Vec::new()), |(name, checker)| (Some(name), checker.close()))
     }
 }
 
-/// There is none in this build.
+/// The place of the device in a build without Vulkan.
 #[cfg(not(feature = "vulkan"))]
 struct Device;
 

@@ -1,4 +1,4 @@
-//! `cuesta synth`: a synthetic field, written to a file.
+//! `cuesta synth`: writes a synthetic field to a file.
 
 use std::path::PathBuf;
 
@@ -11,26 +11,26 @@ use super::report;
 use crate::height::synth::{self, Kind};
 use crate::height::{Footprint, Loaded, Samples, save};
 
-/// Arguments.
+/// Arguments of `cuesta synth`.
 #[derive(Args, Debug)]
 pub struct SynthArgs {
-    /// What kind of field.
+    /// The kind of field.
     #[arg(help = kinds())]
     pub kind: Kind,
-    /// Samples.
+    /// Size of the field, samples.
     #[arg(long, value_name = "WxH", default_value = "1025x1025", value_parser = super::scene::size)]
     pub size: [u32; 2],
-    /// The same seed gives the same bytes on every machine.
+    /// Seed; the same seed gives the same bytes on every machine.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Where to: .tif, .png, .asc, .r16 or .raw.
+    /// Output file: .tif, .png, .asc, .r16 or .raw.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 }
 
 fn kinds() -> String {
     let names: Vec<_> = synth::KINDS.iter().map(|kind| format!("{} ({})", kind.name, kind.about)).collect();
-    format!("What kind of field: {}", names.join(", "))
+    format!("Kind of field: {}", names.join(", "))
 }
 
 /// Runs the subcommand.

@@ -1,31 +1,31 @@
-//! The technique on the command line: its name, its settings, and the error it may make.
+//! The technique on the command line: its name, its settings, and the tolerance that it keeps.
 
 use std::sync::Arc;
 
-use anyhow::{Result, anyhow, bail};
-use clap::{Args, ValueEnum};
+use anyhow::{Error, Result, anyhow, bail};
+use clap::{Args, Command, ValueEnum};
 
 use super::common::Common;
 use super::numbers::FINEST;
 use super::report;
 use super::scene::key_value;
 use crate::height::Field;
-use crate::lod::{self, Settings, Technique};
+use crate::lod::{Entry, Settings, Technique, TechniqueSpec, Techniques};
 use crate::view::{Metric, Tolerance};
 
-/// Which technique draws, and how well.
+/// The technique and the tolerance.
 #[derive(Args, Debug, Clone)]
 pub struct TechniqueArgs {
     /// Technique, or technique:variant.
-    #[arg(long, value_name = "T", default_value = "geomipmap", help = technique_help())]
-    pub technique: String,
+    #[arg(long, value_name = "T", default_value = "geomipmap")]
+    pub technique: TechniqueSpec,
     /// A setting of the technique; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub settings: Vec<(String, String)>,
-    /// Error allowed, pixels.
+    /// Largest error on the screen, pixels.
     #[arg(long, value_name = "PX", default_value_t = 1.0)]
     pub tolerance: f64,
-    /// The meaning of a pixel of error.
+    /// Formula that converts metres of error to pixels.
     #[arg(long, value_enum, default_value_t = MetricArg::Certified)]
     pub metric: MetricArg,
 }
@@ -33,14 +33,14 @@ pub struct TechniqueArgs {
 /// [`Metric`] as a word.
 #[derive(ValueEnum, Clone, Copy, Debug)]
 pub enum MetricArg {
-    /// A true bound for every pixel.
+    /// An upper bound for every pixel.
     Certified,
-    /// As published.
+    /// The formula of the paper: no bound off the view axis.
     Paper,
 }
 
 impl MetricArg {
-    /// As it is written.
+    /// Returns the word.
     pub fn name(self) -> &'static str {
         match self {
             MetricArg::Certified => "certified",
@@ -49,16 +49,31 @@ impl MetricArg {
     }
 }
 
-fn technique_help() -> String {
-    let names = lod::TECHNIQUES.iter().flat_map(|entry| {
-        let variants = entry.variants.iter().map(|v| format!("{}:{}", entry.name, v.name));
-        std::iter::once(entry.name.to_string()).chain(variants)
-    });
-    format!("Technique, or technique:variant: {}", names.collect::<Vec<_>>().join(", "))
+/// Lists the techniques in the help of each subcommand that draws one.
+pub(super) fn with_names(command: Command, techniques: &Techniques) -> Command {
+    let specs: Vec<_> = techniques.specs().iter().map(TechniqueSpec::to_string).collect();
+    let help = format!("Technique, or technique:variant: {}", specs.join(", "));
+    let takes_one = |command: &&Command| {
+        command.get_arguments().any(|arg| arg.get_id() == "technique" && !arg.get_default_values().is_empty())
+    };
+    let names: Vec<_> = command.get_subcommands().filter(takes_one).map(|c| c.get_name().to_string()).collect();
+    let listed = |command: Command| command.mut_arg("technique", |arg| arg.help(&help));
+    names.into_iter().fold(command, |command, name| command.mut_subcommand(name, listed))
 }
 
-/// Settings of a technique, with errors that name the flag at fault.
-pub(super) fn settings(entry: &lod::Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Settings> {
+/// Returns the technique that `--technique` names.
+///
+/// # Errors
+/// If there is none of this name.
+pub(super) fn entry(techniques: &Techniques, spec: &TechniqueSpec) -> Result<&'static Entry> {
+    techniques.entry(spec).map_err(|why| anyhow!("--technique {why}"))
+}
+
+/// Returns the settings of a technique.
+///
+/// # Errors
+/// If a variant, a key or a value is unknown. The error names the flag at fault.
+pub(super) fn settings(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Settings> {
     Settings::new(entry, variant, choices).map_err(|what| {
         let is_variant = variant.is_some_and(|name| entry.variants.iter().all(|variant| variant.name != name));
         anyhow!("{}: {what}", if is_variant { "--technique" } else { "--set" })
@@ -66,28 +81,30 @@ pub(super) fn settings(entry: &lod::Entry, variant: Option<&str>, choices: &[(St
 }
 
 impl TechniqueArgs {
-    /// The table's row, and the settings for it.
-    pub fn settings(&self) -> Result<(&'static lod::Entry, Settings)> {
-        let (name, variant) = match self.technique.split_once(':') {
-            Some((name, variant)) => (name, Some(variant)),
-            None => (self.technique.as_str(), None),
-        };
-        let entry = lod::find(name).ok_or_else(|| {
-            let known: Vec<_> = lod::TECHNIQUES.iter().map(|entry| entry.name).collect();
-            anyhow!("--technique {name}: expected one of {}", known.join(", "))
-        })?;
-        Ok((entry, settings(entry, variant, &self.settings)?))
+    /// Returns the row of the table and the settings for it.
+    ///
+    /// # Errors
+    /// If a name or a value is unknown.
+    pub fn settings(&self, techniques: &Techniques) -> Result<(&'static Entry, Settings)> {
+        let entry = entry(techniques, &self.technique)?;
+        Ok((entry, settings(entry, self.technique.variant.as_deref(), &self.settings)?))
     }
 
-    /// The technique, prepared for the field.
+    /// Prepares the technique for a field, and warns of settings without effect.
+    ///
+    /// # Errors
+    /// If a name or a value is unknown, or the technique cannot draw the field.
     pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
-        let (entry, settings) = self.settings()?;
+        let (entry, settings) = self.settings(&common.techniques)?;
         report::warn_of_idle(common, entry, &settings);
         let _spinner = report::preparing(common, entry.name, &settings.progress);
-        entry.prepare(field, &settings).map_err(anyhow::Error::msg)
+        entry.prepare(field, &settings).map_err(Error::msg)
     }
 
-    /// The tolerance under the metric.
+    /// Returns the tolerance.
+    ///
+    /// # Errors
+    /// If it is not finite or too small.
     pub fn tolerance(&self) -> Result<Tolerance> {
         if !(self.tolerance.is_finite() && self.tolerance >= FINEST) {
             bail!("--tolerance {:?}: expected at least {FINEST:e} pixels", self.tolerance);

@@ -1,4 +1,4 @@
-//! `cuesta view`: the window.
+//! `cuesta view`: opens a window.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use crate::lod::budget::Target;
 use crate::viewer::times::Percentiles;
 use crate::viewer::{self, Setup};
 
-/// Arguments.
+/// Arguments of `cuesta view`.
 #[derive(Args, Debug)]
 pub struct ViewerArgs {
-    /// Where heights come from.
+    /// The height data.
     #[command(flatten)]
     pub terrain: TerrainArgs,
     /// The view at the start.
@@ -30,13 +30,13 @@ pub struct ViewerArgs {
     /// The look at the start.
     #[command(flatten)]
     pub look: LookArgs,
-    /// Whether frames wait for the display.
+    /// Wait for the display before each frame.
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub vsync: Switch,
-    /// Hold this many triangles a frame by moving the tolerance.
+    /// Hold this number of triangles per frame by moving the tolerance.
     #[arg(long, value_name = "N", conflicts_with = "frame_time")]
     pub triangles: Option<f64>,
-    /// Hold this many milliseconds a frame in the same way; frames do not wait for the display then.
+    /// Hold this many milliseconds per frame by moving the tolerance, without waiting for the display.
     #[arg(long, value_name = "MS")]
     pub frame_time: Option<f64>,
     /// Close the window after this many seconds.
@@ -62,13 +62,13 @@ struct Viewed {
     validation_messages: Vec<String>,
 }
 
-/// Whether a window can be opened.
+/// Returns true if a window can be opened.
 pub fn has_display() -> bool {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !cfg!(all(unix, not(target_os = "macos"))) || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
 }
 
-/// What a frame is to cost.
+/// Returns the budget of a frame.
 fn target(args: &ViewerArgs) -> Result<Option<Target>> {
     let target = args.triangles.map(Target::Triangles).or(args.frame_time.map(Target::FrameMs));
     if let Some(cost) = target.map(|target| target.cost()).filter(|cost| !(cost.is_finite() && *cost > 0.0)) {
@@ -87,7 +87,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         bail!("--seconds: expected a number of seconds");
     }
     let target = target(args)?;
-    let technique = args.technique.settings()?;
+    let technique = args.technique.settings(&common.techniques)?;
     report::warn_of_idle(common, technique.0, &technique.1);
     let Loaded { field, footprint, .. } = args.terrain.load(common)?;
     let field = Arc::new(field);
@@ -97,6 +97,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         view: args.view.build(&field, args.technique.tolerance()?)?,
         field,
         near: args.view.near,
+        techniques: common.techniques.clone(),
         technique,
         choices: args.technique.settings.clone(),
         overlay,

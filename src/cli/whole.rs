@@ -1,24 +1,24 @@
-//! The view in which all of a field is seen: what is drawn where nothing is said about the eye.
+//! The default view: all of a field.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::height::Field;
 use crate::view::{Lens, Metric, Tolerance, View};
 
-/// The field as one thing to look at.
+/// The extent of a field, and an eye that sees all of it.
 pub struct Whole {
     /// Its centre at mean height.
     pub centre: DVec3,
     /// Half its diagonal, metres.
     pub radius: f64,
-    /// From where all of it is seen, from the south and above.
+    /// Position of the eye, south of the field and above it.
     pub eye: DVec3,
-    /// The eye's rotation there.
+    /// Rotation of the eye there.
     pub world_from_eye: DMat3,
 }
 
 impl Whole {
-    /// The view of a whole field for a horizontal field of view in degrees.
+    /// Returns the view of a whole field for a horizontal field of view in degrees.
     pub fn of(field: &Field, fov: f64, size: [u32; 2]) -> Self {
         let statistics = field.statistics();
         let [w, h] = field.size().map(|n| f64::from(n - 1));
@@ -39,12 +39,12 @@ impl Whole {
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
             time_s: 0.0,
         };
-        // The rectangle around the corners on the screen, if all are in front of the eye.
+        // Returns the rectangle around the corners on the screen, if all are in front of the eye.
         let outline = |view: &View| {
             let seen: Option<Vec<_>> = corners.iter().map(|&c| view.project(c).map(|p| p.pixel)).collect();
             seen.map(|s| (s.iter().copied().fold(s[0], DVec2::min), s.iter().copied().fold(s[0], DVec2::max)))
         };
-        // From afar, come closer while all of it fits, moving aside so that it stays in the middle.
+        // Approaches from afar while all of the field fits, and moves sideways to keep it centred.
         let half_angle = (fov.to_radians() / 2.0).min(picture.y / (2.0 * at(1.0, DVec3::ZERO).focal_px()));
         let mut view = at(4.0 * radius / half_angle.tan(), DVec3::ZERO);
         let mut aside = DVec3::ZERO;

@@ -1,4 +1,4 @@
-//! `cuesta info --working-set`: which nodes of a map over the whole field a view needs, and how fine, as a picture.
+//! `cuesta info --working-set`: draws the nodes of a map over the whole field that a view needs, by level.
 
 use std::path::Path;
 
@@ -28,13 +28,13 @@ pub struct Needed {
     slots: u32,
     /// Bytes of the nodes on the device.
     bytes: u64,
-    /// Length of a texel, pixels: 1, or longer where the memory does not hold that.
+    /// Length of a texel on the screen, pixels: 1, or longer where the memory does not suffice.
     texel_px: f64,
     texels: f64,
     texels_a_pixel: f64,
-    /// Nodes by level, from the root's on.
+    /// Number of nodes by level, from the root on.
     levels: Vec<usize>,
-    /// What the picture shows of the field, samples: first ones along (x, z), and how many.
+    /// Part of the field that the picture shows, samples: first ones along (x, z), and their number.
     shown: [f64; 3],
 }
 
@@ -44,8 +44,8 @@ struct Window {
     side: f64,
 }
 
-/// Finds the nodes that a view needs within `texture_bytes`, and draws them: each node in the colour of its level, darker where its texture is smaller;
-/// grey is not needed. The picture shows the smallest square around all nodes below the root.
+/// Finds the nodes that a view needs within `texture_bytes`, and draws each in the colour of its level. Smaller textures
+/// are darker; unneeded nodes are grey. The picture shows the smallest square around all nodes below the root.
 pub fn draw(
     field: &Field,
     technique: &mut dyn Technique,
@@ -102,7 +102,7 @@ impl Window {
         Self { first: ends.map(|[low, high]| (low + high - widest) / 2.0), side: widest }
     }
 
-    /// Where a pixel's middle lies on the map.
+    /// Returns the position of a pixel's centre on the map.
     fn at(&self, x: u32, y: u32) -> [f64; 2] {
         [(0, x), (1, y)].map(|(k, n)| self.first[k] + (f64::from(n) + 0.5) / f64::from(SIDE_PX) * self.side)
     }
@@ -117,7 +117,7 @@ fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
             let node = TileId { level, at: at.map(|part| (part * f64::from(1u32 << level)) as u32) };
             Some((node, set.resolution(node)?))
         };
-        // The finest there is: others lie below it.
+        // The finest node lies on top of the others.
         let found = (0..levels as u32).rev().filter(|_| is_on_map).find_map(of_level);
         found.map_or(Rgba([40, 40, 40, 255]), |(node, resolution)| colour(node, resolution, at, pixel_side))
     })
@@ -125,7 +125,7 @@ fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
 
 fn colour(node: TileId, resolution: u32, at: [f64; 2], pixel_side: f64) -> Rgba<u8> {
     let side = 0.5f64.powi(node.level as i32);
-    // A line of a pixel around each node that is large enough for it.
+    // A line one pixel wide surrounds each node that is large enough for it.
     let is_edge = (0..2).any(|k| at[k] / side - f64::from(node.at[k]) < pixel_side / side) && side > 5.0 * pixel_side;
     if is_edge {
         return Rgba([0, 0, 0, 255]);

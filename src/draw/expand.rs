@@ -5,7 +5,9 @@ use super::place::{explicit_height, explicit_position, placed};
 use super::skirts::is_skirted;
 use super::{Draw, DrawList, Geometry, Instance, RESTART, Source, Topology};
 use crate::height::Field;
-use crate::height::surface::{Corner, Triangle, doubled_area};
+use crate::height::surface::{self, Corner, Triangle, doubled_area};
+use crate::view::View;
+use glam::DVec3;
 
 /// A triangle of a draw list.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +38,17 @@ pub fn visit_triangles(
 pub fn triangles(field: &Field, frame: &Frame, resident: &Geometry, list: &DrawList) -> Vec<Drawn> {
     let mut drawn = Vec::new();
     visit_triangles(field, frame, resident, list, |t| drawn.push(*t));
+    drawn
+}
+
+/// Returns the triangles that are drawn of a list, in world metres, without skirts.
+///
+/// `resident` is the technique's resident geometry, `view` the view that the list was selected for.
+pub fn world_triangles(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Vec<[DVec3; 3]> {
+    let mut drawn = Vec::new();
+    visit_triangles(field, &Frame::placing(field, view), resident, list, |triangle| {
+        drawn.push(triangle.corners.each_ref().map(|corner| surface::world(field, corner, list.fraction_bits)));
+    });
     drawn
 }
 

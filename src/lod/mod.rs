@@ -6,6 +6,7 @@ pub mod brute_force;
 pub mod budget;
 pub mod clusters;
 pub mod geomipmap;
+pub mod registry;
 pub mod settings;
 pub mod smooth_tiles;
 pub mod sorted_strips;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use crate::draw::{DeviceGeometry, DrawList, Geometry, GpuSelection, Limits, PipelineRequirements, Submission};
 use crate::height::Field;
 use crate::view::{Metric, Tolerance, View};
+pub use registry::{TechniqueSpec, Techniques};
 pub use settings::{Need, Setting, Settings, Values};
 
 /// A level-of-detail algorithm, prepared for one field.
@@ -157,6 +159,7 @@ pub struct Variant {
 }
 
 /// One row of the table of techniques.
+#[derive(Clone, Debug)]
 pub struct Entry {
     /// Its name on the command line.
     pub name: &'static str,

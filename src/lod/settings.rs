@@ -8,7 +8,7 @@ use crate::height::progress::Progress;
 pub enum Values {
     /// One of these words.
     Words(&'static [&'static str]),
-    /// A number between these two, inclusive.
+    /// A number in this range, ends included.
     Number(f64, f64),
 }
 
@@ -46,10 +46,10 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Applies `choices` to the defaults of `entry`.
+    /// Returns the settings of `entry` with `choices` in place of defaults.
     ///
     /// # Errors
-    /// Returns the allowed values if the variant, a key or a value is unknown.
+    /// If a variant, a key or a value is unknown. The error lists the allowed ones.
     pub fn new(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Self, String> {
         let variant = match variant {
             None => None,
@@ -76,7 +76,7 @@ impl Settings {
         Self { variant: None, values, progress: Progress::default() }
     }
 
-    /// Returns the settings that have no effect beside the others, one line each.
+    /// Returns a line for each setting without effect under the others.
     pub fn idle(&self, entry: &Entry) -> Vec<String> {
         let is_set = |key: &str| self.values.iter().any(|(s, value)| s.key == key && value != s.default);
         let is_idle = |need: &&Need| is_set(need.key) && !need.words.contains(&self.word(need.other));
@@ -87,7 +87,7 @@ impl Settings {
         entry.needs.iter().filter(is_idle).map(line).collect()
     }
 
-    /// Returns the chosen variant; `None` for the default one.
+    /// Returns the variant, if it is not the default one.
     pub fn variant(&self) -> Option<&'static str> {
         self.variant
     }

@@ -8,11 +8,13 @@ pub mod extended;
 pub mod geometric;
 pub mod hidden;
 pub mod histogram;
+#[cfg(feature = "bench")]
 pub mod image;
 pub mod peers;
 pub mod picture;
 pub mod pop;
 mod projection;
+#[cfg(feature = "bench")]
 pub mod reference;
 pub mod summary;
 pub mod watertight;

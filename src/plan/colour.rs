@@ -40,13 +40,13 @@ colours! {
     Error = "error",
     /// Surface normal.
     Normal = "normal",
-    /// Draw.
+    /// Draw call.
     Batch = "batch",
-    /// Level and edges of the overlay's tiles (--texture-memory).
+    /// Level and borders of the overlay's tiles (--texture-memory).
     Maps = "maps",
-    /// A ground of 2^36 texels, made where they are seen.
+    /// A ground of 2^36 texels, generated near the eye.
     Ground = "ground",
-    /// Level and edges of the tiles of that ground.
+    /// Level and borders of the tiles of that ground.
     Nodes = "nodes",
 }
 

@@ -2,6 +2,7 @@
 
 pub mod capture;
 pub mod holes;
+pub mod picture;
 pub mod probed;
 pub mod savings;
 mod source;

@@ -1,6 +1,6 @@
 //! Technique configurations of the stress suite: each technique, variant and setting word.
 
-use crate::lod::{self, Entry, Need, Settings, TECHNIQUES, Values};
+use crate::lod::{Entry, Need, Settings, TechniqueSpec, Techniques, Values};
 
 /// A technique with a variant and settings.
 #[derive(Clone)]
@@ -35,12 +35,15 @@ impl TechniqueConfig {
 }
 
 /// Returns the default configuration of each technique named (`name` or `name:variant`), or of all techniques and
-/// variants if none is. Fails for an unknown name.
-pub fn with_defaults(techniques: &[String]) -> Result<Vec<TechniqueConfig>, String> {
-    if techniques.is_empty() {
-        return Ok(TECHNIQUES.iter().flat_map(variants).collect());
+/// variants if none is.
+///
+/// # Errors
+/// If a name is unknown. The error lists all names.
+pub fn with_defaults(techniques: &Techniques, names: &[String]) -> Result<Vec<TechniqueConfig>, String> {
+    if names.is_empty() {
+        return Ok(techniques.entries().iter().flat_map(|entry| variants(entry)).collect());
     }
-    techniques.iter().map(|name| parse(name)).collect()
+    names.iter().map(|name| parse(techniques, name)).collect()
 }
 
 /// Returns the default configuration of a technique and of each of its variants.
@@ -50,20 +53,24 @@ fn variants(entry: &'static Entry) -> impl Iterator<Item = TechniqueConfig> {
 }
 
 /// Parses `technique` or `technique:variant`.
-fn parse(name: &str) -> Result<TechniqueConfig, String> {
-    let (technique, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
-    let known = || TECHNIQUES.iter().flat_map(variants).map(|config| config.name).collect::<Vec<_>>().join(", ");
-    let entry = lod::find(technique).ok_or_else(|| format!("--technique {name}: expected one of {}", known()))?;
-    let Some(variant) = variant else { return Ok(TechniqueConfig::new(entry, None, &[])) };
-    let found = entry.variants.iter().find(|known| known.name == variant);
-    let found = found.ok_or_else(|| format!("--technique {name}: expected one of {}", known()))?;
-    Ok(TechniqueConfig::new(entry, Some(found.name), &[]))
+fn parse(techniques: &Techniques, name: &str) -> Result<TechniqueConfig, String> {
+    let found = name.parse().ok().and_then(|spec: TechniqueSpec| {
+        let is_named = |config: &TechniqueConfig| config.variant == spec.variant.as_deref();
+        variants(techniques.find(&spec.name)?).find(is_named)
+    });
+    found.ok_or_else(|| {
+        let known: Vec<_> = techniques.specs().iter().map(TechniqueSpec::to_string).collect();
+        format!("--technique {name}: expected one of {}", known.join(", "))
+    })
 }
 
 /// Returns the default configurations, each followed by one configuration per non-default word of every setting.
-/// Other settings that the word requires are set too. Fails for an unknown name.
-pub fn with_each_word(techniques: &[String]) -> Result<Vec<TechniqueConfig>, String> {
-    let defaults = with_defaults(techniques)?;
+/// Other settings that the word requires are set too.
+///
+/// # Errors
+/// If a name is unknown.
+pub fn with_each_word(techniques: &Techniques, names: &[String]) -> Result<Vec<TechniqueConfig>, String> {
+    let defaults = with_defaults(techniques, names)?;
     let with_words = |config: TechniqueConfig| {
         let words = config.entry.settings.iter().flat_map(|setting| {
             let words = if let Values::Words(words) = setting.values { words } else { &[] };

@@ -33,6 +33,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use rayon::prelude::*;
 
 use crate::height::Field;
+use crate::lod::Techniques;
 use crate::view::View;
 
 pub use self::flight::Flight;
@@ -183,14 +184,17 @@ fn panic_text(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
 }
 
-/// Combines cases with techniques (`name` or `name:variant`; all if empty). Flights use every word of every setting,
-/// other cases the default settings.
-pub fn case_runs(cases: &[&'static Case], techniques: &[String]) -> Result<Vec<CaseRun>, String> {
+/// Combines cases with the techniques named (`name` or `name:variant`), or with all. Flights use every word of every
+/// setting, other cases the default settings.
+///
+/// # Errors
+/// If a name is unknown.
+pub fn case_runs(cases: &[&'static Case], techniques: &Techniques, names: &[String]) -> Result<Vec<CaseRun>, String> {
     let mut runs = Vec::new();
     for &case in cases {
         let configs = match case.kind {
-            Kind::Terrain(_) | Kind::PerTechnique(_) => forms::with_defaults(techniques)?,
-            Kind::Flight(_) => forms::with_each_word(techniques)?,
+            Kind::Terrain(_) | Kind::PerTechnique(_) => forms::with_defaults(techniques, names)?,
+            Kind::Flight(_) => forms::with_each_word(techniques, names)?,
             Kind::Standalone(..) => Vec::new(),
         };
         if let Kind::Standalone(..) = case.kind {

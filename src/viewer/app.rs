@@ -68,7 +68,7 @@ impl<'a> App<'a> {
     pub fn new(setup: &'a Setup) -> Self {
         Self {
             setup,
-            bindings: bindings::table(),
+            bindings: bindings::table(&setup.techniques),
             session: Session::new(setup),
             open: None,
             input: Input::default(),

@@ -6,7 +6,7 @@ use glam::DVec3;
 use winit::event::KeyEvent;
 use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 
-use crate::lod;
+use crate::lod::Techniques;
 
 /// An action of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,8 +73,8 @@ pub struct Binding {
     pub action: Action,
 }
 
-/// Returns all bindings.
-pub fn table() -> Vec<Binding> {
+/// Returns the whole table. The digits choose the first nine techniques.
+pub fn table(techniques: &Techniques) -> Vec<Binding> {
     use Action as A;
     use Trigger::{Character, Drag, Named, Position, Wheel};
     let row = |triggers: &[Trigger], about: &str, action| Binding {
@@ -110,7 +110,7 @@ pub fn table() -> Vec<Binding> {
         (KeyCode::Digit8, KeyCode::Numpad8),
         (KeyCode::Digit9, KeyCode::Numpad9),
     ];
-    for (k, (entry, (digit, pad))) in lod::TECHNIQUES.iter().zip(digits).enumerate() {
+    for (k, (entry, (digit, pad))) in techniques.entries().iter().zip(digits).enumerate() {
         rows.push(row(&[Position(digit), Position(pad)], &format!("technique: {}", entry.name), A::Technique(k)));
     }
     rows.extend([
@@ -187,13 +187,13 @@ mod tests {
 
     #[test]
     fn triggers_are_unique_and_every_technique_has_a_key() {
-        let rows = table();
+        let rows = table(&Techniques::built_in());
         let triggers: Vec<_> = rows.iter().flat_map(|row| &row.triggers).collect();
         for (k, trigger) in triggers.iter().enumerate() {
             assert!(!triggers[..k].contains(trigger), "{trigger} occurs twice");
         }
         let techniques = rows.iter().filter(|row| matches!(row.action, Action::Technique(_))).count();
-        assert_eq!(techniques, lod::TECHNIQUES.len());
+        assert_eq!(techniques, Techniques::built_in().entries().len());
         assert!(rows.iter().all(|row| !row.keys().is_empty() && !row.about.is_empty()));
     }
 }

@@ -18,7 +18,7 @@ use winit::event_loop::EventLoop;
 use crate::gpu::Choice;
 use crate::height::Field;
 use crate::lod::budget::Target;
-use crate::lod::{Entry, Settings};
+use crate::lod::{Entry, Settings, Techniques};
 use crate::plan::Look;
 use crate::view::View;
 use app::{App, QuitEvent};
@@ -34,6 +34,8 @@ pub struct Setup {
     pub view: View,
     /// Distance of the near plane, metres; `None` to follow the height above ground.
     pub near: Option<f64>,
+    /// The techniques that keys choose from.
+    pub techniques: Techniques,
     /// Technique and settings at the start.
     pub technique: (&'static Entry, Settings),
     /// Settings given on the command line for that technique: key and value.

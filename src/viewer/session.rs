@@ -11,7 +11,7 @@ use super::renderer::FrameStats;
 use super::site::Site;
 use super::times::Smoothed;
 use crate::lod::budget::{Controller, RANGE_PX, Target};
-use crate::lod::{Entry, Settings, TECHNIQUES};
+use crate::lod::{Entry, Settings};
 use crate::plan::{Colour, Look};
 use crate::view::{Metric, Tolerance, View};
 
@@ -87,7 +87,7 @@ impl Session {
             Action::Move(_) | Action::Fast | Action::Turn | Action::Speed => {}
             Action::Camera => self.camera.next_mode(&self.site),
             Action::Home => self.camera = Camera::of(&setup.view),
-            Action::Technique(k) => return self.set_technique(setup, &TECHNIQUES[k], None),
+            Action::Technique(k) => return self.set_technique(setup, setup.techniques.entries()[k], None),
             Action::Variant => {
                 let (entry, settings) = &self.technique;
                 let names: Vec<_> = std::iter::once(None).chain(entry.variants.iter().map(|v| Some(v.name))).collect();

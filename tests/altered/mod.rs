@@ -1,8 +1,8 @@
 //! Techniques with altered draw lists or requirements, for tests that must notice the difference.
 
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
-use cuesta::lod::{Entry, Technique, geomipmap};
-use cuesta::view::View;
+use cuesta::internal::draw::{DrawList, Geometry, Limits, PipelineRequirements};
+use cuesta::internal::lod::{Entry, Technique, geomipmap};
+use cuesta::internal::view::View;
 
 /// A technique whose draw lists and requirements are changed after the fact.
 pub struct Altered {

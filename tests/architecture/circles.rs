@@ -90,8 +90,9 @@ fn no_file_uses_itself_through_others() {
 fn made_up_circles_are_found() {
     let files =
         |texts: &[(&str, &str)]| -> Vec<_> { texts.iter().map(|(f, t)| (f.to_string(), t.to_string())).collect() };
-    type Circle = (&'static [(&'static str, &'static str)], &'static [&'static str]);
-    let cases: [Circle; 5] = [
+    /// Files with their texts, and the circles in them.
+    type Case = (&'static [(&'static str, &'static str)], &'static [&'static str]);
+    let cases: [Case; 5] = [
         (&[("a/mod.rs", "mod b;\nuse b::B;"), ("a/b.rs", "use super::A;")], &["a a::b"]),
         (
             &[

@@ -91,7 +91,7 @@ fn forbidden(module: &[String], target: &[String]) -> Option<String> {
     if from == to {
         let techniques = (module.get(1)?, target.get(1)?);
         let is_technique =
-            |name: &str| cuesta::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
+            |name: &str| cuesta::internal::lod::TECHNIQUES.iter().any(|entry| entry.name.replace('-', "_") == name);
         let is_forbidden =
             from == "lod" && techniques.0 != techniques.1 && is_technique(techniques.0) && is_technique(techniques.1);
         return is_forbidden.then(|| format!("technique {} uses technique {}", techniques.0, techniques.1));

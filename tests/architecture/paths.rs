@@ -13,7 +13,7 @@ pub fn without_comments(text: &str) -> String {
 /// Returns the module path of a file of `src`: `lod/geomipmap/mod.rs` is `lod::geomipmap`.
 pub fn module_of(file: &str) -> Vec<String> {
     let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
-    let is_root = ["lib", "main"].contains(&path);
+    let is_root = ["lib", "main", "internal"].contains(&path);
     path.split('/').filter(|_| !is_root).map(str::to_string).collect()
 }
 
@@ -33,7 +33,7 @@ pub fn used(code: &str, module: &[String]) -> Vec<(usize, Vec<String>)> {
         }
         if let Some(root) = rest.strip_prefix("crate::") {
             base.clear();
-            rest = root;
+            rest = root.strip_prefix("internal::").unwrap_or(root);
         }
         found.extend(from(code, at, rest, &base));
     }

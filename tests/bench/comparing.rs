@@ -1,13 +1,13 @@
 //! Regressions in simulated times, as noisy as those of a software device on a shared machine: each time moves by up
 //! to 12 %, one in twenty by 38 %.
 
-use cuesta::bench::compare::{THRESHOLD, compare};
-use cuesta::bench::results::Results;
-use cuesta::bench::rows::{ErrorRow, Errors, Row, TimeRow, Within};
-use cuesta::bench::run::Timed;
-use cuesta::bench::sample::FrameSample;
-use cuesta::bench::{Case, Times};
-use cuesta::measure::summary::Summary;
+use cuesta::internal::bench::compare::{THRESHOLD, compare};
+use cuesta::internal::bench::results::Results;
+use cuesta::internal::bench::rows::{ErrorRow, Errors, Row, TimeRow, Within};
+use cuesta::internal::bench::run::Timed;
+use cuesta::internal::bench::sample::FrameSample;
+use cuesta::internal::bench::{Case, Times};
+use cuesta::internal::measure::summary::Summary;
 
 use super::mock::{self, Mock};
 

@@ -1,8 +1,8 @@
 //! Cases with a goal: the driver and its rows.
 
-use cuesta::bench::Case;
-use cuesta::bench::goal::{BudgetStats, Goal};
-use cuesta::bench::results::Results;
+use cuesta::internal::bench::Case;
+use cuesta::internal::bench::goal::{BudgetStats, Goal};
+use cuesta::internal::bench::results::Results;
 
 use super::mock;
 

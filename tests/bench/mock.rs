@@ -6,20 +6,20 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::controller::ToleranceController;
-use cuesta::bench::rows::{Decision, Device, Errors, Header, Machine, PendingFrames, Plan, Within, Worst};
-use cuesta::bench::run::{BenchBackend, BenchScene, Ended, Run, Timed};
-use cuesta::bench::{Case, FrameSample, SCHEMA, Terrain};
-use cuesta::height::Field;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::measure::economy::Economy;
-use cuesta::measure::geometric::AngleBin;
-use cuesta::measure::histogram::{Bin, Histogram};
-use cuesta::measure::image::ImageError;
-use cuesta::measure::peers::PeersError;
-use cuesta::measure::pop::Pop;
-use cuesta::measure::reference::Reference;
-use cuesta::measure::summary::Summary;
+use cuesta::internal::bench::controller::ToleranceController;
+use cuesta::internal::bench::rows::{Decision, Device, Errors, Header, Machine, PendingFrames, Plan, Within, Worst};
+use cuesta::internal::bench::run::{BenchBackend, BenchScene, Ended, Run, Timed};
+use cuesta::internal::bench::{Case, FrameSample, SCHEMA, Terrain};
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::measure::economy::Economy;
+use cuesta::internal::measure::geometric::AngleBin;
+use cuesta::internal::measure::histogram::{Bin, Histogram};
+use cuesta::internal::measure::image::ImageError;
+use cuesta::internal::measure::peers::PeersError;
+use cuesta::internal::measure::pop::Pop;
+use cuesta::internal::measure::reference::Reference;
+use cuesta::internal::measure::summary::Summary;
 use image::{Rgb, RgbImage};
 
 /// Its one adjustable thing: what it leaves unmeasured.

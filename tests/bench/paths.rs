@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use cuesta::bench::paths;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::view::{Lens, Metric, Tolerance};
+use cuesta::internal::bench::paths;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::view::{Lens, Metric, Tolerance};
 
 /// A file of poses: x, y, z, yaw, pitch as printed; `None`, said aloud, where there is none.
 fn printed(file: &str) -> Option<Vec<[String; 5]>> {

@@ -4,11 +4,11 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cuesta::bench::journal::ROWS;
-use cuesta::bench::results::{RESULTS, Results, TABLE};
-use cuesta::bench::rows::Row;
-use cuesta::bench::run::{Ended, Run};
-use cuesta::bench::{BenchBackend, journal};
+use cuesta::internal::bench::journal::ROWS;
+use cuesta::internal::bench::results::{RESULTS, Results, TABLE};
+use cuesta::internal::bench::rows::Row;
+use cuesta::internal::bench::run::{Ended, Run};
+use cuesta::internal::bench::{BenchBackend, journal};
 use rayon::prelude::*;
 
 use super::mock::{self, Mock};
@@ -77,8 +77,9 @@ fn cases_of_a_scene_take_turns_and_the_warm_up_is_dropped() {
     let folder = tempfile::tempdir().unwrap();
     let calls = mock::run(folder.path(), fields, cases.clone(), 3).calls;
     let (spin, circle) = cases.split_at(11);
-    let turn =
-        |cases: &[cuesta::bench::Case], what: &str| cases.iter().map(|c| format!("{what} {c}")).collect::<Vec<_>>();
+    let turn = |cases: &[cuesta::internal::bench::Case], what: &str| {
+        cases.iter().map(|c| format!("{what} {c}")).collect::<Vec<_>>()
+    };
     let scene =
         |cases| [turn(cases, "time"), turn(cases, "time"), turn(cases, "time"), turn(cases, "measure")].concat();
     assert_eq!(calls, [scene(spin), scene(circle)].concat());
@@ -98,7 +99,7 @@ fn the_base_is_that_of_the_same_tolerance() {
     let cases: Vec<_> = [1.0, 8.0].iter().flat_map(|&px| [of("geomipmap", px), of("clusters", px)]).collect();
     let folder = tempfile::tempdir().unwrap();
     mock::run(folder.path(), fields.clone(), cases, 3);
-    let (mut header, rows) = cuesta::bench::journal::read(folder.path()).unwrap();
+    let (mut header, rows) = cuesta::internal::bench::journal::read(folder.path()).unwrap();
     header.base = "geomipmap".to_string();
     let times: Vec<_> = Results::of(header, &rows).cases.into_iter().map(|case| case.time.unwrap()).collect();
     for pair in times.chunks(2) {
@@ -124,7 +125,7 @@ fn rows_of_another_run_are_refused_in_one_line() {
     let same = mock::header(&mut mock, &fields);
     let stop = AtomicBool::new(false);
     let run = Run { folder: folder.path(), cases, fields, rounds: 1, warm_up: 3, stop: &stop };
-    let mut refused = |change: &dyn Fn(&mut cuesta::bench::Header), word: &str| {
+    let mut refused = |change: &dyn Fn(&mut cuesta::internal::bench::Header), word: &str| {
         let mut header = same.clone();
         change(&mut header);
         let error = format!("{:#}", run.run(&mut mock as &mut dyn BenchBackend, header, &mut |_| {}).unwrap_err());

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use boon::{Compiler, SchemaIndex, Schemas};
-use cuesta::bench::Case;
-use cuesta::bench::goal::Goal;
-use cuesta::bench::journal::ROWS;
-use cuesta::bench::results::{self, RESULTS, Results, TABLE};
-use cuesta::bench::rows::{ErrorRow, Errors, Row};
-use cuesta::measure::summary::Summary;
-use cuesta::renamed;
+use cuesta::internal::bench::Case;
+use cuesta::internal::bench::goal::Goal;
+use cuesta::internal::bench::journal::ROWS;
+use cuesta::internal::bench::results::{self, RESULTS, Results, TABLE};
+use cuesta::internal::bench::rows::{ErrorRow, Errors, Row};
+use cuesta::internal::measure::summary::Summary;
+use cuesta::internal::renamed;
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 

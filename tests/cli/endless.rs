@@ -1,4 +1,4 @@
-//! The land without samples on the command line, and the picture of a working set.
+//! The procedural terrain on the command line, and the picture of a working set.
 
 use super::{folder, json, refused};
 

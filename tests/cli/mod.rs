@@ -243,7 +243,7 @@ fn wrong_use_is_one_line_and_exit_code_2() {
 #[test]
 fn help_names_every_technique() {
     let help = stdout(&cuesta(folder().path(), &["export", "--help"]));
-    for entry in cuesta::lod::TECHNIQUES {
+    for entry in cuesta::internal::lod::TECHNIQUES {
         assert!(help.contains(entry.name), "{}", entry.name);
     }
 }

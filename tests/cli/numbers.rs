@@ -1,7 +1,7 @@
-//! Numbers as flags take them: negative ones, gdalinfo's spellings, and errors that name only flags that were given.
+//! Numbers in flags: negative ones, gdalinfo's spellings, and errors that name only flags that were given.
 
 use clap::error::ErrorKind;
-use cuesta::cli::{Cli, command};
+use cuesta::internal::cli::{Cli, command};
 
 use super::*;
 use crate::height::{
@@ -9,7 +9,7 @@ use crate::height::{
     tiny,
 };
 
-/// A command line that has all that a subcommand needs.
+/// Returns a command line with everything that a subcommand requires.
 fn words(subcommand: &clap::Command, more: &[&str]) -> Vec<String> {
     let mut words = vec!["cuesta".to_string(), subcommand.get_name().to_string()];
     let is_needed = |arg: &&clap::Arg| arg.is_required_set() || arg.get_id() == "terrain";
@@ -38,10 +38,10 @@ fn every_flag_for_numbers_takes_negative_ones() {
             found.push(long.to_string());
             for value in ["-1", "-3.4028234663852886e+38", "-1.#IND", "-inf", "-1,-1"] {
                 if let Err(error) = parse(value) {
-                    // A value that is refused for what it is, by the flag's name.
-                    let line = cuesta::cli::one_line(&error);
+                    // The value is refused under the flag's name.
+                    let line = cuesta::internal::cli::one_line(&error);
                     let is_named = line.contains(&flag) && !line.contains("unexpected");
-                    // A flag whose value may be left out takes no word that begins like a flag.
+                    // A flag with an optional value takes no word that begins like a flag.
                     assert!(is_named || long == "measure", "{} {flag} {value}: {line}", subcommand.get_name());
                 }
             }
@@ -54,7 +54,7 @@ fn every_flag_for_numbers_takes_negative_ones() {
     }
 }
 
-/// Holes that remain for a value of `--nodata`.
+/// Returns the number of holes under a value of `--nodata`.
 fn holes(folder: &Path, nodata: &str) -> Value {
     json(folder, &["info", "land.tif", "--nodata", nodata])["hole_count"].clone()
 }
@@ -97,7 +97,7 @@ fn negative_scales_and_gdalinfo_pixel_sizes() {
     }
 }
 
-/// An error names only flags that are on the command line, for any content of the file.
+/// An error names only flags of the command line, for any content of the file.
 #[test]
 fn no_error_names_a_flag_that_was_not_given() {
     let folder = folder();

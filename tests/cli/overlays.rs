@@ -1,4 +1,4 @@
-//! Pictures laid over a field and terrain of extreme sizes, from the command line.
+//! Overlays, and terrain of extreme sizes, from the command line.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use tiff::tags::Tag;
 use super::with_a_device::has_device;
 use super::*;
 
-/// A picture drawn from straight above a place, by samples as they are.
+/// Draws a picture from straight above a place, of the samples as stored.
 fn above(folder: &Path, terrain: &[&str], eye: &str, width: &str) -> RgbaImage {
     let view = ["-o", "p.png", "--size", "120x90", "--eye", eye, "--pitch=-90", "--yaw=-90", "--ortho", width];
     let more = ["--technique", "brute-force", "--validate", "--quiet"];
@@ -17,7 +17,7 @@ fn above(folder: &Path, terrain: &[&str], eye: &str, width: &str) -> RgbaImage {
     image::open(folder.join("p.png")).expect("a picture").into_rgba8()
 }
 
-/// The share of pixels with a channel that differs by more than 8.
+/// Returns the share of pixels with a channel that differs by more than 8.
 fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
     let differs = |(p, q): &(&image::Rgba<u8>, &image::Rgba<u8>)| p.0.iter().zip(q.0).any(|(x, y)| x.abs_diff(y) > 8);
     a.pixels().zip(b.pixels()).filter(differs).count() as f64 / a.pixels().len() as f64
@@ -39,7 +39,7 @@ fn the_demos_overlay_repeats_and_is_cropped_with_it() {
     assert!(difference(&whole, &other) > 0.5, "elsewhere is another picture");
 }
 
-/// Land of 61 × 41 samples, 10 m apart, whose north-west sample lies at 500005, 4100395.
+/// Writes terrain of 61 × 41 samples, 10 m apart, whose north-west sample lies at 500005, 4100395.
 fn terrain(folder: &Path) {
     let mut text = "ncols 61\nnrows 41\nxllcorner 500000\nyllcorner 4099990\ncellsize 10\n".to_string();
     (0..41).for_each(|j| {
@@ -51,12 +51,12 @@ fn terrain(folder: &Path) {
 
 const PROJECTION: &str = r#"PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],UNIT["metre",1],AUTHORITY["EPSG","32632"]]"#;
 
-/// Red in its north-west quarter, blue elsewhere.
+/// Makes a picture that is red in its north-west quarter and blue elsewhere.
 fn quarters([w, h]: [u32; 2]) -> RgbImage {
     RgbImage::from_fn(w, h, |x, y| if x < w / 2 && y < h / 2 { Rgb([230, 0, 0]) } else { Rgb([0, 0, 230]) })
 }
 
-/// A GeoTIFF picture in a coordinate system, its north-west corner and texel in metres.
+/// Writes a GeoTIFF picture in a coordinate system, with its north-west corner and texel size in metres.
 fn geotiff(file: &Path, picture: &RgbImage, epsg: u16, corner: [f64; 2], step: f64) {
     let mut encoder = TiffEncoder::new(std::fs::File::create(file).unwrap()).unwrap();
     let (w, h) = picture.dimensions();
@@ -75,7 +75,7 @@ fn is_sky(pixel: &image::Rgba<u8>) -> bool {
     pixel.0.iter().zip(SKY).all(|(a, b)| a.abs_diff(b) <= 3)
 }
 
-/// The picture's content at a place, metres east and south of the north-west sample, in a picture from [`above`] the middle.
+/// Returns the colour at a place, metres east and south of the north-west sample, in a picture from [`above`] the middle.
 fn at(picture: &RgbaImage, east: f64, south: f64) -> &'static str {
     let pixel = picture.get_pixel((east - 300.0 + 360.0) as u32 / 6, (south - 200.0 + 270.0) as u32 / 6).0;
     match pixel {
@@ -136,7 +136,7 @@ fn a_picture_of_another_coordinate_system_is_refused() {
     let render = ["render", "land.asc", "-o", "p.png", "--overlay", "other.tif"];
     geotiff(&folder.path().join("other.tif"), &quarters([4, 4]), 32633, [500_200.0, 4_100_300.0], 10.0);
     refused(folder.path(), &render, &["other.tif", "EPSG:32632", "EPSG:32633"]);
-    // Elsewhere in the same system is no fault, but worth saying.
+    // An overlay elsewhere in the same system is a warning, not an error.
     geotiff(&folder.path().join("other.tif"), &quarters([4, 4]), 32632, [900_200.0, 4_100_300.0], 10.0);
     if has_device() {
         let told = cuesta(folder.path(), &render);
@@ -145,7 +145,7 @@ fn a_picture_of_another_coordinate_system_is_refused() {
     }
 }
 
-/// 588 MB of texels: more than decoders allow by themselves.
+/// A picture of 588 MB: more than decoders allow by default.
 #[test]
 fn a_picture_of_14_000_texels_a_side_opens() {
     let folder = folder();
@@ -170,7 +170,7 @@ fn a_picture_of_14_000_texels_a_side_opens() {
     }
 }
 
-/// Millimetres, thousands of kilometres, and the smallest field: land is seen, and nothing is said.
+/// Millimetres, thousands of kilometres, and the smallest field: terrain is in view, without a warning.
 #[test]
 fn terrain_of_any_size_is_seen() {
     if !has_device() {

@@ -1,5 +1,5 @@
-//! What goes wrong around the program: a full disk, a path that cannot be written, a reader that has gone, Ctrl-C. One line
-//! and exit code 2, the old file or the new one, and nothing beside it.
+//! Faults around the program: a full disk, an unwritable path, a closed pipe, Ctrl-C. The program prints one line, exits
+//! with code 2, and leaves the old file or the new one, and nothing else.
 #![cfg(unix)]
 
 use std::os::unix::fs::symlink;
@@ -9,17 +9,17 @@ use std::time::{Duration, Instant};
 use super::*;
 use crate::height::tiff_file::{Tag, TiffFile};
 
-/// A limit in kibibytes on every file that is written: a full disk as any user can have it.
+/// Limits the size of every written file, kibibytes: a full disk without special rights.
 fn with_room(folder: &Path, kib: u32, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_cuesta");
-    // Without the signal writing fails as it does on a full disk.
+    // Without the signal a write fails as on a full disk.
     let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", 2 * kib);
     let mut command = Command::new("sh");
     command.args(["-c", &script, "sh", program]).args(arguments).current_dir(folder);
     command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().expect("a shell")
 }
 
-/// What lies in a folder, by name.
+/// Returns the names in a folder.
 fn listing(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry"));
     let mut files: Vec<_> = entries
@@ -37,7 +37,7 @@ fn assert_one_line(output: &Output, parts: &[&str], what: &str) {
     assert!(parts.iter().all(|part| said.contains(part)), "{what}: {said}");
 }
 
-/// Every command that writes a file, but for those that need a device.
+/// Returns every command that writes a file without a device.
 const WRITERS: [&[&str]; 8] = [
     &["synth", "fractal", "--size", "257x257", "-o", "out.tif"],
     &["synth", "fractal", "--size", "257x257", "-o", "out.png"],
@@ -86,7 +86,7 @@ fn a_full_disk_leaves_the_rows_and_their_report() {
     assert!(listing(&folder.path().join("kept")).is_empty(), "no part of a file");
 }
 
-/// Paths that no one can write to, the superuser neither: below a file, and where the kernel says no.
+/// Returns paths that not even the superuser can write to: below a file, and where the kernel refuses.
 #[test]
 fn what_cannot_be_written_is_named() {
     let folder = folder();
@@ -110,7 +110,7 @@ fn what_cannot_be_written_is_named() {
     refused(folder.path(), &["synth", "flat", "-o", "folder.tif"], &["folder.tif"]);
 }
 
-/// Runs it with its two outputs where they are said to go.
+/// Runs a command with its outputs redirected.
 fn to(folder: &Path, arguments: &[&str], out: Stdio, err: Stdio) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
     command.args(arguments).current_dir(folder).stdout(out).stderr(err).output().expect("the program starts")
@@ -133,7 +133,7 @@ fn a_reader_that_has_gone_is_no_failure() {
         drop(reader);
         let output = to(folder.path(), arguments, writer.into(), Stdio::piped());
         assert_eq!((code(&output), output.stderr.len()), (0, 0), "{arguments:?}: {:?}", output.stderr);
-        // Nor is one of what goes wrong.
+        // Nor may an output contain one of the faults.
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
         let wrong = [&["--no-such-flag"], arguments].concat();
@@ -157,13 +157,13 @@ fn no_room_for_what_is_said_is_a_failure() {
     assert_eq!(code(&output), 0, "the link is replaced, as any file is");
 }
 
-/// Interrupts a call after a while and waits for its end; whether it had not ended by itself.
+/// Interrupts a command after a delay. Returns true if it was still running.
 fn interrupted(folder: &Path, arguments: &[&str], after: Duration) -> (Output, bool) {
     let start = Instant::now();
     interrupted_when(folder, arguments, || start.elapsed() >= after)
 }
 
-/// Interrupts a call as soon as something is so.
+/// Interrupts a command as soon as a condition holds.
 pub(super) fn interrupted_when(folder: &Path, arguments: &[&str], is_time: impl Fn() -> bool) -> (Output, bool) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
     command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -179,7 +179,7 @@ pub(super) fn interrupted_when(folder: &Path, arguments: &[&str], is_time: impl 
     (program.wait_with_output().expect("it ends"), was_running)
 }
 
-/// A quarter of a second is soon enough for nothing to have been done, four are late enough for all of it.
+/// A quarter of a second is too short for any result; four seconds are enough for all.
 #[test]
 fn an_interrupt_at_any_moment_leaves_whole_files_only() {
     let folder = folder();
@@ -198,7 +198,7 @@ fn an_interrupt_at_any_moment_leaves_whole_files_only() {
             let (output, was_running) = interrupted(folder.path(), &larger, takes.mul_f64(f64::from(part) / 11.0));
             let found = std::fs::read(&path).unwrap();
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            // At the very start a signal ends any program.
+            // At its very start a signal ends any program.
             let is_stopped = output.status.code().is_none_or(|code| code == 2);
             assert!(is_stopped || code(&output) == 0, "{arguments:?}: {said}");
             assert!(found == b"old" || found == whole, "{arguments:?}: {} bytes", found.len());
@@ -212,7 +212,7 @@ fn an_interrupt_at_any_moment_leaves_whole_files_only() {
     assert!(stopped > 6, "{stopped} calls were stopped");
 }
 
-/// The suite says what it found until it was stopped, and that there would have been more.
+/// A stopped suite prints its findings, and that it was stopped.
 #[test]
 fn an_interrupted_suite_tells_what_it_found() {
     let folder = folder();
@@ -220,7 +220,7 @@ fn an_interrupted_suite_tells_what_it_found() {
     for wait in 1..40 {
         let (output, was_running) = interrupted(folder.path(), &arguments, Duration::from_millis(100 * wait));
         let told: Option<Value> = serde_json::from_str(&stdout(&output)).ok();
-        // Stopped before it could tell, or after all was found.
+        // The signal came before the handler was installed, or after the end.
         let Some(told) = told.filter(|_| was_running) else { continue };
         let Some(why) = told["ended"].as_str() else { continue };
         assert!(why.contains("stopped") && code(&output) == 1, "{why}, exit code {}", code(&output));
@@ -237,7 +237,7 @@ fn an_interrupted_suite_tells_what_it_found() {
     panic!("the suite was never stopped in time");
 }
 
-/// Found at random: a text that claims more than the file holds made the decoder talk on stderr.
+/// Found by fuzzing: a text that claims more than the file holds made the decoder print to stderr.
 #[test]
 fn a_text_longer_than_its_file_is_one_line() {
     let folder = folder();
@@ -249,7 +249,7 @@ fn a_text_longer_than_its_file_is_one_line() {
     refused(folder.path(), &["info", "claim.tif"], &["claim.tif", "directory", "42112"]);
 }
 
-/// Found at random: no tolerance is wide enough for what is farther than f64 can tell, and 10^-300 px took an hour.
+/// Found by fuzzing: no tolerance suffices beyond the range of f64, and 10^-300 px took an hour.
 #[test]
 fn lengths_beyond_reason_are_refused_and_fine_tolerances_are_not_slow() {
     let folder = folder();

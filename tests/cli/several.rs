@@ -4,7 +4,7 @@ use std::fs;
 
 use super::{folder, json, refused, synth};
 
-/// Heights that belong to a grid of 10 m, whose corner is at a column and a row.
+/// Returns heights of a grid of 10 m whose corner is at a column and a row.
 fn grid(column: u32, row: u32) -> String {
     let corner = format!("xllcorner {}\nyllcorner {}\n", 600_000 + 10 * column, 200_000 - 10 * row);
     let heights = format!("{column} {row} 7\n").repeat(3);
@@ -66,7 +66,7 @@ fn formats_that_are_not_read_are_named_in_one_line() {
     }
 }
 
-/// Opening a pipe waits for its writer.
+/// Opening a pipe blocks until it has a writer.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_refused_at_once() {

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use cuesta::height::save::save;
-use cuesta::lod::TECHNIQUES;
-use cuesta::stress::{self, Kind};
+use cuesta::internal::height::save::save;
+use cuesta::internal::lod::TECHNIQUES;
+use cuesta::internal::stress::{self, Kind};
 use rayon::prelude::*;
 
 use super::*;
 
-/// Seconds for a command on a field of the stress suite: each takes a few at most on a machine with other work.
+/// Time limit of a command on a field of the stress suite, seconds. Each takes a few seconds on a busy machine.
 const BOUND_S: u64 = 120;
 
 /// The guide's commands on a field, small ones: the number of frames and pixels is not what could make them run for ever. `T`
@@ -45,13 +45,13 @@ const COMMANDS: &[&[&str]] = &[
     &["bench", "compare", "run", "run"],
     &["report", "run"],
 ];
-/// As many of them go without a device.
+/// Number of commands that need no device.
 const WITHOUT_A_DEVICE: usize = 3;
 /// Commands of the guide that the list leaves out: a window, which has tests of its own, what reads no field, and the stress
 /// suite itself.
 const ELSEWHERE: [&str; 3] = ["view", "synth", "stress"];
 
-/// Ends a command that runs longer than its bound, and returns how it ended.
+/// Runs a command and kills it at its limit. Returns its exit status.
 fn watched(folder: &Path, arguments: &[&str]) -> Result<i32, String> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cuesta"));
     command.args(arguments).current_dir(folder).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");

@@ -1,8 +1,8 @@
-//! What of the program needs a device. Without one the tests say so and pass, unless REQUIRE_GPU=1.
+//! Subcommands that need a device. Without one the tests print so and pass, unless REQUIRE_GPU=1.
 
 use super::*;
 
-/// Whether there is a device; without one, says so.
+/// Returns true if there is a device; prints a line if not.
 pub(super) fn has_device() -> bool {
     let output = cuesta(folder().path(), &["info", "--devices", "--json"]);
     let found = code(&output) == 0 && stdout(&output).contains("\"usable\": true");
@@ -66,7 +66,7 @@ fn a_benchmark_holds_what_it_is_asked_for() {
         return;
     }
     synth(folder.path(), "eroded", "257x257", "land.tif");
-    // A whole circle in so few frames: what is in sight changes faster than one step can follow.
+    // A whole circle in few frames: the view changes faster than one step of the controller can follow.
     let case = ["--technique", "sorted-strips", "--path", "circle", "--frames", "40", "--size", "160x90"];
     let goals = ["--triangles", "3000,10000", "--frame-time", "4", "--rounds", "1", "--out", "b"];
     let output = cuesta(folder.path(), &[&["bench", "land.tif"][..], &case, &goals].concat());
@@ -81,7 +81,7 @@ fn a_benchmark_holds_what_it_is_asked_for() {
         assert!((0.9..1.1).contains(&mean), "{target}: {mean} of it on average");
         assert!(case["time"]["held"]["within"].as_f64().unwrap() > 0.1, "{case}");
     }
-    // Milliseconds are the machine's own: what counts is that the tolerance moved.
+    // Times differ between machines; the test checks only that the tolerance moved.
     let tolerance = &cases[2]["time"]["held"]["tolerance_px"];
     assert_eq!(cases[2]["case"]["goal"]["frame_ms"].as_f64(), Some(4.0));
     assert!(tolerance["max"].as_f64() > tolerance["mean"].as_f64(), "{tolerance}");
@@ -129,7 +129,7 @@ fn texture_memory_is_kept_to_or_refused() {
     let view = ["render", "demo", "-o", "p.png", "--size", "64x36", "--texture-memory", "1"];
     refused(folder.path(), &[&view[..], &["--colour", "ground"]].concat(), &["1 MB: expected at least 2 MB"]);
     assert!(!folder.path().join("p.png").exists());
-    // 4 MB of texels: in parts, and a picture all the same.
+    // With 4 MB of texels the overlay is streamed, and the picture is complete.
     let rendered = json(folder.path(), &[&view[..], &["--overlay", "large.png"]].concat());
     assert!(rendered["texture_maps"]["bytes"].as_u64().unwrap() <= 1_000_000, "{rendered}");
     let rendered = json(folder.path(), &["render", "demo", "-o", "p.png", "--size", "64x36", "--colour", "ground"]);
@@ -164,7 +164,7 @@ fn the_plan_says_what_is_left_out() {
     assert!(value("index bytes, six classes") < value("index bytes, sixteen masks"));
 }
 
-/// A table of a profile against the same rows of its document: every cell.
+/// Compares a table of a profile with its document, cell by cell.
 fn assert_same_rows(folder: &Path, table: &str, rows: &Value) {
     let mut reader = csv::Reader::from_path(folder.join(table)).unwrap();
     let heads = reader.headers().unwrap().clone();
@@ -208,7 +208,7 @@ fn profile_writes_tables_a_document_and_a_trace_that_agree() {
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 5, "nothing else is left there");
 }
 
-/// The layer's best practices warn of what every tool does (naming objects, for one).
+/// The layer's best practices warn of common calls, such as naming objects.
 #[test]
 fn a_validation_message_ends_with_exit_code_1() {
     if !has_device() {
@@ -265,7 +265,7 @@ fn profile_says_in_one_line_what_it_cannot_do() {
     assert!(!folder.path().join("q").exists());
 }
 
-/// A library of RenderDoc's name whose frame capture notes what it was called for.
+/// Builds a library of RenderDoc's name that records the calls of its frame capture.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_loaded_renderdoc_captures_the_slowest_mode() {
@@ -298,7 +298,7 @@ fn a_loaded_renderdoc_captures_the_slowest_mode() {
     assert_eq!(std::fs::read_to_string(at.join("calls")).unwrap(), "start\nend\n");
 }
 
-/// What is drawn is the old picture or the new one; what was measured stays, and the same command goes on.
+/// A failed run leaves the old picture or the new one. Measured rows stay, and the same command continues.
 #[test]
 fn a_device_that_is_lost_is_told_and_takes_nothing_with_it() {
     if !has_device() {
@@ -329,7 +329,7 @@ fn a_device_that_is_lost_is_told_and_takes_nothing_with_it() {
     assert_eq!(failed.count(), 1, "the loss is told once, and what was found without a device stays: {told}");
 }
 
-/// The first Ctrl-C ends a benchmark after the row at hand, and a picture at once.
+/// The first Ctrl-C ends a benchmark after the current row, and a picture at once.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_rows_and_pictures() {
@@ -373,7 +373,7 @@ fn an_interrupt_keeps_rows_and_pictures() {
     assert_eq!(beside, 3, "land.tif, p.png and b, and nothing else");
 }
 
-/// A loader that finds no driver, and one that finds the same twice.
+/// Loaders without a driver, and with the same driver twice.
 #[test]
 fn drivers_that_are_missing_or_there_twice_are_told() {
     if !has_device() {
@@ -422,7 +422,7 @@ fn drivers_that_are_missing_or_there_twice_are_told() {
     }
 }
 
-/// A display that nobody serves, and none at all.
+/// A display without a server, and no display.
 #[cfg(feature = "viewer")]
 #[test]
 fn without_a_display_the_window_says_so() {

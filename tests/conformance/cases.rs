@@ -4,9 +4,9 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::{Entry, Setting, Settings, TECHNIQUES, Values};
-use cuesta::stress::views;
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::lod::{Entry, Setting, Settings, TECHNIQUES, Values};
+use cuesta::internal::stress::views;
 
 /// A choice of variant and settings.
 pub struct Form {

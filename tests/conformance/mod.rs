@@ -8,9 +8,9 @@ mod sweep;
 
 use std::sync::Arc;
 
-use cuesta::lod::TECHNIQUES;
-use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
-use cuesta::stress::views;
+use cuesta::internal::lod::TECHNIQUES;
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::views;
 use rayon::prelude::*;
 
 /// Checks all invariants at once, so that each technique is prepared once. A failure names the invariant, the technique

@@ -3,20 +3,20 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::weights::{SkirtWeights, SlotWeights};
-use cuesta::draw::{
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::weights::{SkirtWeights, SlotWeights};
+use cuesta::internal::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Seams, Source,
     Topology,
 };
-use cuesta::height::Field;
-use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks, side};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::{Lens, View};
+use cuesta::internal::height::Field;
+use cuesta::internal::lod::geomipmap::mesh::{BlockMesh, Masks, side};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::{Lens, View};
 
-use cuesta::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
-use cuesta::stress::views;
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::views;
 
 use super::cases;
 
@@ -56,9 +56,13 @@ const MUTANTS: &[Mutant] = &[
     ("same view, same list", "a counter", "differ", "131 × 67", |field| {
         in_another_view(field, every_other_time_coarser)
     }),
-    ("teleport and return, same list", "a persistent coarser level", "after teleport and return", "131 × 67", |field| {
-        in_another_view(field, coarser_since_far_away)
-    }),
+    (
+        "teleport and return, same list",
+        "a persistent coarser level",
+        "after teleport and return",
+        "131 × 67",
+        |field| in_another_view(field, coarser_since_far_away),
+    ),
     ("lists fit the limits", "an instance too many", "exceeds", "ramp", |field| changed(field, one_instance_too_many)),
     ("lists fit the limits", "an index too many", "reaches outside", "ramp", |field| {
         changed(field, one_index_too_many)
@@ -336,7 +340,7 @@ fn narrower(view: &View, _: &mut u32) -> View {
 
 fn with_paper_metric(view: &View, _: &mut u32) -> View {
     let mut view = *view;
-    view.tolerance.metric = cuesta::view::Metric::Paper;
+    view.tolerance.metric = cuesta::internal::view::Metric::Paper;
     view
 }
 

@@ -9,14 +9,14 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cuesta::cli::whole::Whole;
-use cuesta::draw::DrawList;
-use cuesta::height::{self, Field, Options, synth};
-use cuesta::lod::{self, Settings};
-use cuesta::stress::invariants::{INVARIANTS, Subject};
-use cuesta::stress::sweep::{self, SweepCase, random, shrink};
-use cuesta::stress::views;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::cli::whole::Whole;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{self, Field, Options, synth};
+use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject};
+use cuesta::internal::stress::sweep::{self, SweepCase, random, shrink};
+use cuesta::internal::stress::views;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
 
 use crate::altered::BLOCK_LOST;

@@ -1,24 +1,25 @@
-//! Command lines: words of every subcommand, right and wrong, up to what a device or a window would be needed for.
+//! Command lines: words of every subcommand, right and wrong, up to the point where a device or window would be opened.
 
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 use clap::Arg;
-use cuesta::cli::bench::{BenchArgs, MeasureArgs};
-use cuesta::cli::cases::Planned;
-use cuesta::cli::scene::{LookArgs, ReadArgs, ViewArgs};
-use cuesta::cli::technique::TechniqueArgs;
-use cuesta::cli::{Cli, Command, Common, one_line};
-use cuesta::height::{Field, save, synth};
+use cuesta::internal::cli::bench::{BenchArgs, MeasureArgs};
+use cuesta::internal::cli::cases::Planned;
+use cuesta::internal::cli::scene::{LookArgs, ReadArgs, ViewArgs};
+use cuesta::internal::cli::technique::TechniqueArgs;
+use cuesta::internal::cli::{Cli, Command, Common, one_line};
+use cuesta::internal::height::{Field, save, synth};
+use cuesta::internal::lod::Techniques;
 use fastrand::Rng;
 
 use super::views::check_list;
 use super::{fuzz, mutate};
 
-/// Fields of more samples are only looked at from outside.
+/// Largest field, samples, on which techniques are prepared.
 const MAX_SAMPLES: u64 = 1 << 16;
 
-/// What flags take, right and nearly so, beside [`mutate::WORDS`] and the words that they list themselves.
+/// Values of flags, valid and almost valid, beside [`mutate::WORDS`] and the words that flags list themselves.
 const VALUES: [&str; 26] = [
     "3",
     "0.25",
@@ -59,7 +60,7 @@ static TERRAIN: LazyLock<(tempfile::TempDir, String)> = LazyLock::new(|| {
 fn value(random: &mut Rng, argument: &Arg) -> String {
     let own = argument.get_possible_values();
     let technique = |random: &mut Rng| {
-        let entry = mutate::one(random, cuesta::lod::TECHNIQUES);
+        let entry = mutate::one(random, cuesta::internal::lod::TECHNIQUES);
         let variant = entry.variants.get(random.usize(..4)).map(|variant| format!(":{}", variant.name));
         format!("{}{}", entry.name, variant.unwrap_or_default())
     };
@@ -72,16 +73,16 @@ fn value(random: &mut Rng, argument: &Arg) -> String {
     }
 }
 
-/// A command line without the program's name.
+/// Generates a command line without the program's name.
 fn words(random: &mut Rng) -> Vec<String> {
-    let root = cuesta::cli::command();
+    let root = cuesta::internal::cli::command();
     let commands: Vec<_> = root.get_subcommands().collect();
     let command = mutate::one(random, &commands);
     let mut words = vec![command.get_name().to_string()];
     let flags: Vec<_> = command.get_arguments().chain(root.get_arguments()).collect();
     let positions = flags.iter().filter(|flag| flag.is_positional()).count();
     words.extend((0..positions).map(|_| if random.u8(..8) == 0 { value(random, flags[0]) } else { TERRAIN.1.clone() }));
-    // What every call needs.
+    // Arguments that every call needs.
     words.extend(
         flags
             .iter()
@@ -105,7 +106,7 @@ fn words(random: &mut Rng) -> Vec<String> {
     words
 }
 
-/// Holds that an error is one line.
+/// Asserts that an error is one line.
 fn outcome_of<T>(result: anyhow::Result<T>) -> Option<T> {
     let error = match result {
         Ok(value) => return Some(value),
@@ -119,7 +120,7 @@ fn quiet() -> Common {
     Common { quiet: true, ..Common::default() }
 }
 
-/// Reads the field, and selects in the view if that is soon done.
+/// Reads the field, and selects in the view if that is fast.
 fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: Option<&LookArgs>) {
     let Some(loaded) =
         outcome_of(ReadArgs { no_cache: true, ..reading.clone() }.load(&quiet(), std::slice::from_ref(&TERRAIN.1)))
@@ -127,7 +128,7 @@ fn looked(reading: &ReadArgs, view: &ViewArgs, technique: &TechniqueArgs, look: 
         return;
     };
     look.map(|look| outcome_of(look.build(&quiet(), &TERRAIN.1, (&loaded.field, &loaded.footprint))));
-    let Some((entry, settings)) = outcome_of(technique.settings()) else { return };
+    let Some((entry, settings)) = outcome_of(technique.settings(&Techniques::built_in())) else { return };
     let field: Arc<Field> = Arc::new(loaded.field);
     let Some(view) = outcome_of(technique.tolerance().and_then(|tolerance| view.build(&field, tolerance))) else {
         return;

@@ -1,17 +1,17 @@
-//! Height files: small ones of every format, changed.
+//! Height files: small ones of every format, mutated.
 
-use cuesta::height::{Options, load_bytes_with};
+use cuesta::internal::height::{Options, load_bytes_with};
 use fastrand::Rng;
 
 use super::{fuzz, mutate};
 use crate::height::tiny;
 
-/// What ends the data and begins the header beside it.
+/// Separator between the data and the header file.
 const HEADER: &[u8] = b"\xffH";
-/// The most samples that may be read.
+/// Largest number of samples that may be read.
 const MAX_SAMPLES: u64 = 1 << 16;
 
-/// Two bytes of wishes, the file, and a header beside it.
+/// Generates two bytes of options, the file, and its header file.
 fn seeds() -> Vec<Vec<u8>> {
     let seed = |file: tiny::Tiny| {
         let wishes = [u8::from(file.options.raw.is_some()), u8::from(file.options.encoding.is_some())];

@@ -1,6 +1,6 @@
-//! Random inputs, seed by seed: files, command lines, views, rows. Whatever comes in, the answer is a result or an error
-//! of one line. Each target runs for `FUZZ_SECONDS` (2 unless set) from the seed `FUZZ_SEED` (1 unless set) on, and says
-//! how many inputs it had; what fails is made as small as it still fails. `./x fuzz` runs all of them for long.
+//! Fuzzing by seed: files, command lines, views, rows. Every input gives a result or an error of one line. Each target runs
+//! for `FUZZ_SECONDS` (default 2) from the seed `FUZZ_SEED` (default 1), and prints its number of inputs. A failing input is
+//! reduced. `./x fuzz` runs all targets for longer.
 
 mod arguments;
 mod files;
@@ -16,10 +16,10 @@ use std::time::{Duration, Instant};
 
 use fastrand::Rng;
 
-/// An input that takes longer hangs: the process ends and names the seed.
+/// Time limit of one input: beyond it the process aborts and prints the seed.
 const HANG: Duration = Duration::from_secs(120);
 
-/// Feeds `check` with what `generate` makes of each seed.
+/// Feeds `check` with the input that `generate` makes of each seed.
 fn fuzz<T: Clone + Debug>(target: &'static str, generate: impl Fn(&mut Rng) -> Vec<T>, check: impl Fn(&[T])) {
     let number = |name| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a whole number"));
     let (seconds, first) = (number("FUZZ_SECONDS").unwrap_or(2), number("FUZZ_SEED").unwrap_or(1));
@@ -39,14 +39,14 @@ fn fuzz<T: Clone + Debug>(target: &'static str, generate: impl Fn(&mut Rng) -> V
     println!("{target}: {} inputs, {seconds} s, seeds from {first}", seed - first);
 }
 
-/// What a check panics with.
+/// Returns the message of a panic in `check`.
 fn fault<T>(check: impl Fn(&[T]), input: &[T]) -> Option<String> {
     let panic = catch_unwind(AssertUnwindSafe(|| check(input))).err()?;
     let text = panic.downcast_ref::<String>().cloned();
     Some(text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default())
 }
 
-/// Leaves parts out, large ones first, as long as what is left still fails (Zeller & Hildebrandt 2002, without the
+/// Removes parts of an input, large ones first, while the rest still fails (Zeller & Hildebrandt 2002, without the
 /// complements).
 fn smallest<T: Clone>(mut input: Vec<T>, fails: impl Fn(&[T]) -> bool) -> Vec<T> {
     let mut part = input.len() / 2;
@@ -66,9 +66,9 @@ fn smallest<T: Clone>(mut input: Vec<T>, fails: impl Fn(&[T]) -> bool) -> Vec<T>
     input
 }
 
-/// Ends the process if a seed takes too long.
+/// Aborts the process if a seed takes too long.
 struct Watched {
-    /// 0 is no seed any more.
+    /// The current seed; 0 after the last one.
     seed: Arc<AtomicU64>,
 }
 

@@ -1,12 +1,12 @@
-//! Changes of bytes and texts that break readers: bits, sizes, lengths, repeated and missing parts.
+//! Mutations of bytes and texts that break readers: bits, sizes, lengths, repeated and missing parts.
 
 use fastrand::Rng;
 
-/// Numbers at the edges of what programs count with.
+/// Numbers at the limits of integer types.
 const EDGES: [u64; 13] =
     [0, 1, 2, 0x7f, 0x80, 0xff, 0x7fff, 0x8000, 0xffff, 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, u64::MAX];
 
-/// Words that readers of numbers meet.
+/// Texts in place of numbers.
 pub const WORDS: [&str; 24] = [
     "0",
     "-0",
@@ -34,12 +34,12 @@ pub const WORDS: [&str; 24] = [
     "ü",
 ];
 
-/// One of these.
+/// Returns one of several values.
 pub fn one<'a, T>(random: &mut Rng, of: &'a [T]) -> &'a T {
     &of[random.usize(..of.len())]
 }
 
-/// A few changes at random places.
+/// Applies a few mutations at random places.
 pub fn bytes(random: &mut Rng, bytes: &mut Vec<u8>, other: &[u8]) {
     for _ in 0..random.usize(1..5) {
         let at = random.usize(..=bytes.len());
@@ -61,7 +61,7 @@ pub fn bytes(random: &mut Rng, bytes: &mut Vec<u8>, other: &[u8]) {
     }
 }
 
-/// Puts an edge of 1 to 8 bytes at a place, in either order.
+/// Writes a limit of 1 to 8 bytes at a place, in either byte order.
 fn number(random: &mut Rng, bytes: &mut [u8], at: usize) {
     let width = 1 << random.usize(..4);
     let value = one(random, &EDGES).wrapping_add(random.u64(..3)).to_le_bytes();
@@ -72,7 +72,7 @@ fn number(random: &mut Rng, bytes: &mut [u8], at: usize) {
     bytes.iter_mut().skip(at).zip(value).for_each(|(byte, new)| *byte = new);
 }
 
-/// Puts a word in place of the next number that is written in digits.
+/// Replaces the next decimal number by a word.
 fn word(random: &mut Rng, bytes: &mut Vec<u8>, at: usize) {
     let is_number = |byte: &u8| byte.is_ascii_digit() || b"+-.".contains(byte);
     let Some(from) = bytes[at..].iter().position(is_number).map(|k| at + k) else { return };

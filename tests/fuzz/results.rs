@@ -1,21 +1,21 @@
-//! Rows of benchmarks and of batteries, changed line by line: results, pages, comparisons and journals of them.
+//! Rows of benchmarks and stress suites, mutated line by line: results, pages, comparisons and journals of them.
 
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cuesta::bench::goal::Goal;
-use cuesta::bench::journal::{Journal, ROWS};
-use cuesta::bench::results::{self, Results};
-use cuesta::bench::{Case, compare};
-use cuesta::report;
-use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
+use cuesta::internal::bench::goal::Goal;
+use cuesta::internal::bench::journal::{Journal, ROWS};
+use cuesta::internal::bench::results::{self, Results};
+use cuesta::internal::bench::{Case, compare};
+use cuesta::internal::report;
+use cuesta::internal::stress::rows::{FILE, Row, SCHEMA, Stress};
 use fastrand::Rng;
 use serde_json::Value;
 
 use super::{fuzz, mutate};
 use crate::bench::mock;
 
-/// The lines of small benchmarks.
+/// Returns the lines of small benchmarks.
 static ROW_LINES: LazyLock<Vec<String>> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
     let fields = vec![mock::field(9)];
@@ -26,7 +26,7 @@ static ROW_LINES: LazyLock<Vec<String>> = LazyLock::new(|| {
     std::fs::read_to_string(folder.path().join(ROWS)).expect("rows").lines().map(str::to_string).collect()
 });
 
-/// What stands in place of a value.
+/// Replacements of a value.
 fn replacement(random: &mut Rng) -> Value {
     match random.u8(..8) {
         0 => Value::Null,
@@ -42,7 +42,7 @@ fn replacement(random: &mut Rng) -> Value {
     }
 }
 
-/// Changes one value somewhere below.
+/// Mutates one value somewhere below.
 fn change(random: &mut Rng, value: &mut Value) {
     match value {
         Value::Object(fields) if !fields.is_empty() && random.u8(..8) > 0 => {
@@ -78,7 +78,7 @@ fn changed(random: &mut Rng, line: &str) -> String {
     }
 }
 
-/// Some of the lines, some of them changed.
+/// Returns some of the lines, some of them mutated.
 fn lines(random: &mut Rng) -> Vec<String> {
     let mut lines: Vec<String> = ROW_LINES.clone();
     for _ in 0..random.usize(..6) {
@@ -101,7 +101,7 @@ fn check(lines: &[String]) {
     for (a, b) in [(&before, &after), (&after, &before), (&after, &after)] {
         serde_json::to_string(&compare::compare(a, b, 0.1)).expect("a comparison is written");
     }
-    // Whether they can be used is theirs to say.
+    // Each reader decides if it accepts them.
     let _ = (results::write(&changed), report::write(&changed), Journal::open(&changed, after.header));
 }
 
@@ -151,7 +151,7 @@ fn whatever_the_suite_a_page_or_one_line() {
     fuzz("suite", |random| vec![changed(random, &whole)], check);
 }
 
-/// Found at random: sums of what rows say went over.
+/// Found by fuzzing: sums of row values overflowed.
 #[test]
 fn numbers_at_the_edge_are_summed() {
     let huge = |line: &String| {

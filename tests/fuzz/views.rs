@@ -1,19 +1,20 @@
-//! Views as the command line takes them, one after the other through every technique: lists that fit their field.
+//! Random views through every technique in sequence: lists keep to their field and limits.
 
 use std::sync::{Arc, LazyLock};
 
-use cuesta::cli::scene::ViewArgs;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, expand};
-use cuesta::height::bezier::{Bezier, LAYERS};
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::stress::forms::{TechniqueConfig, with_each_word};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::cli::scene::ViewArgs;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DrawList, expand};
+use cuesta::internal::height::bezier::{Bezier, LAYERS};
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::lod::Techniques;
+use cuesta::internal::stress::forms::{TechniqueConfig, with_each_word};
+use cuesta::internal::view::{Metric, Tolerance, View};
 use fastrand::Rng;
 
 use super::fuzz;
 
-/// One view in numbers; the first of a sequence says by `pick` which technique and field it is of.
+/// One view in numbers. The `pick` of the first one in a sequence chooses the technique and the field.
 #[derive(Clone, Debug)]
 pub struct Pose {
     pick: usize,
@@ -28,7 +29,7 @@ pub struct Pose {
     time_s: f64,
 }
 
-/// Fields that differ in what is hard about them.
+/// Fields that are difficult in different ways.
 pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
     let terrain = |kind, size| synth::synth(kind, size, 3);
     let mut spaced = terrain(synth::Kind::Fractal, [33, 17]);
@@ -44,9 +45,10 @@ pub static FIELDS: LazyLock<Vec<Arc<Field>>> = LazyLock::new(|| {
 });
 
 static ENDLESS: LazyLock<Arc<Field>> = LazyLock::new(|| Arc::new(Field::endless(Arc::new(Bezier::new(1, LAYERS)))));
-static FORMS: LazyLock<Vec<TechniqueConfig>> = LazyLock::new(|| with_each_word(&[]).expect("the table's own"));
+static FORMS: LazyLock<Vec<TechniqueConfig>> =
+    LazyLock::new(|| with_each_word(&Techniques::built_in(), &[]).expect("the table's own"));
 
-/// A number: within the field, at a sample, or far beyond all reason.
+/// Returns a number: within the field, at a sample, or far outside.
 fn number(random: &mut Rng, scale: f64) -> f64 {
     let sign = if random.bool() { 1.0 } else { -1.0 };
     match random.u8(..8) {
@@ -93,7 +95,7 @@ fn field(pick: usize) -> &'static Arc<Field> {
 }
 
 impl Pose {
-    /// The view, if the command line takes it.
+    /// Returns the view, if the command line accepts it.
     fn view(&self, field: &Field) -> Option<View> {
         let point = |[x, y, z]: [f64; 3]| format!("{x:e},{y:e},{z:e}");
         let [yaw, pitch, roll] = self.angles;
@@ -120,8 +122,8 @@ impl Pose {
     }
 }
 
-/// Holds what any view may ask of any technique: triangles of the field, of numbers.
-pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::Technique) {
+/// Asserts the invariants of any view and technique: finite triangles inside the field.
+pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::internal::lod::Technique) {
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     assert!(list.tolerance_scale >= 1.0, "scale {}", list.tolerance_scale);
@@ -129,7 +131,7 @@ pub fn check_list(field: &Field, view: &View, technique: &mut dyn cuesta::lod::T
         return;
     }
     let [last_x, last_z] = field.size().map(|n| (i64::from(n) - 1) << list.fraction_bits);
-    let is_inside = |corner: &cuesta::height::surface::Corner| {
+    let is_inside = |corner: &cuesta::internal::height::surface::Corner| {
         let [x, z] = [corner.x, corner.z].map(i64::from);
         (0..=last_x).contains(&x) && (0..=last_z).contains(&z) && corner.y.is_finite()
     };
@@ -147,7 +149,7 @@ fn check(poses: &[Pose]) {
     }
 }
 
-/// Found by the test below: a picture of 2 × 185 pixels, 115° wide, in which no finite tolerance is wide enough.
+/// Found by the test below: a picture of 2 × 185 pixels, 115° wide, in which no finite tolerance suffices.
 #[test]
 fn where_no_tolerance_is_wide_enough_none_is_kept() {
     check(&[Pose {

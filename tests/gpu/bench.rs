@@ -4,13 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use cuesta::bench::device::DeviceBackend;
-use cuesta::bench::journal::Journal;
-use cuesta::bench::rows::{Case, ErrorRow, Header, Machine, Row, Terrain, TimeRow};
-use cuesta::bench::run::{BenchBackend, Ended, Run};
-use cuesta::gpu::Gpu;
-use cuesta::height::Field;
-use cuesta::plan::Look;
+use cuesta::internal::bench::device::DeviceBackend;
+use cuesta::internal::bench::journal::Journal;
+use cuesta::internal::bench::rows::{Case, ErrorRow, Header, Machine, Row, Terrain, TimeRow};
+use cuesta::internal::bench::run::{BenchBackend, Ended, Run};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::Field;
+use cuesta::internal::lod::Techniques;
+use cuesta::internal::plan::Look;
 
 use super::{mountains, on_device};
 
@@ -32,10 +33,10 @@ fn rows(gpu: &Arc<Gpu>, field: &Arc<Field>, folder: &Path) -> (Vec<TimeRow>, Vec
         every: 4,
     };
     let fields = vec![(terrain.clone(), Arc::clone(field))];
-    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default(), Techniques::built_in());
     let (device, plans) = backend.describe(&fields).unwrap();
     let header = Header {
-        schema: cuesta::bench::SCHEMA,
+        schema: cuesta::internal::bench::SCHEMA,
         program: String::new(),
         commit: None,
         date: String::new(),

@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::layout::Frame;
-use cuesta::draw::place::relative_position;
-use cuesta::draw::{Seams, expand};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::Technique;
-use cuesta::measure::geometric;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::View;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::place::relative_position;
+use cuesta::internal::draw::{Seams, expand};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::measure::geometric;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::View;
 
 use super::draw_list::{Explicit, Way};
 use super::{as_f32, aslant, difference, mountains, on_device, technique};

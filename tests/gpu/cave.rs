@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::gpu::Gpu;
-use cuesta::height::Field;
-use cuesta::height::cave::Cave;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::lod::Technique;
-use cuesta::measure::geometric;
-use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::holes::Truth;
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::Field;
+use cuesta::internal::height::cave::Cave;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::measure::geometric;
+use cuesta::internal::plan::{Colour, Look, ScenePlan};
+use cuesta::internal::scene::holes::Truth;
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::{difference, on_device, technique};
 

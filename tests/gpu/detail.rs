@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::Scene;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::Scene;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 use image::RgbaImage;
 

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{
+use cuesta::internal::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
     Submission, Topology, Upload, VertexNormals, normals,
 };
-use cuesta::height::{Field, rtin};
-use cuesta::lod::Technique;
-use cuesta::view::View;
+use cuesta::internal::height::{Field, rtin};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::view::View;
 
 use super::{aslant, mountains, on_device, render, technique};
 
@@ -149,7 +149,7 @@ fn whole_metres() -> Arc<Field> {
     let terrain = mountains();
     let heights = (0..terrain.samples().len()).map(|k| terrain.samples().height(k).round()).collect();
     Arc::new(Field::new(
-        cuesta::height::Samples::F32(heights),
+        cuesta::internal::height::Samples::F32(heights),
         terrain.stored(),
         terrain.spacing,
         terrain.holes().clone(),

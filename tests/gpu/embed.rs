@@ -5,7 +5,7 @@ mod example;
 
 use ash::vk;
 use cuesta::embed::{DepthTarget, Target, TerrainRenderer};
-use cuesta::plan::Look;
+use cuesta::internal::plan::Look;
 
 use self::example::Options;
 use super::{golden, on_device};

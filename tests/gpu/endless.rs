@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use cuesta::height::Field;
-use cuesta::height::bezier::{Bezier, LAYERS, SIDE_M};
-use cuesta::view::View;
+use cuesta::internal::height::Field;
+use cuesta::internal::height::bezier::{Bezier, LAYERS, SIDE_M};
+use cuesta::internal::view::View;
 use glam::DVec3;
 
 use super::{aslant, on_device, render, technique};

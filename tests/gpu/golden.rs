@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cuesta::gpu::Gpu;
-use cuesta::height::synth;
-use cuesta::lod;
-use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::view::View;
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::synth;
+use cuesta::internal::lod;
+use cuesta::internal::plan::{Colour, Look, ScenePlan};
+use cuesta::internal::view::View;
 
 use super::{aslant, difference, on_device, technique};
 
@@ -33,7 +33,7 @@ fn compare_look(gpu: &Arc<Gpu>, name: &str, settings: &[&str], look: &Look, file
         .requirements(technique.pipeline_requirements())
         .build()
         .unwrap();
-    let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look, overlay: None };
+    let scene = cuesta::internal::scene::Scene { gpu, field: &field, plan: &plan, look, overlay: None };
     let drawn = scene.render(technique.as_mut(), &view, 1).unwrap().picture;
     check(&drawn, file);
 }

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::{DrawList, Submission};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, Holes, Samples, demo, synth};
-use cuesta::lod::Technique;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::{DrawList, Submission};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, Holes, Samples, demo, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::{mountains, on_device, technique};
 
@@ -19,10 +19,10 @@ type Set = Vec<([u32; 2], Vec<u32>)>;
 
 /// Returns the instances with their kind, sorted. The batch is a position in the list and is ignored.
 fn set(list: &DrawList) -> Set {
-    let of_draw = |draw: &cuesta::draw::Draw| {
+    let of_draw = |draw: &cuesta::internal::draw::Draw| {
         let range = [draw.indices.start, draw.indices.end];
         list.instances[draw.instances.start as usize..draw.instances.end as usize].iter().map(move |instance| {
-            let alike = cuesta::draw::Instance { batch: 0, ..*instance };
+            let alike = cuesta::internal::draw::Instance { batch: 0, ..*instance };
             (range, bytemuck::cast_slice(bytemuck::bytes_of(&alike)).to_vec())
         })
     };

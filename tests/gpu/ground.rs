@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use cuesta::gpu::Gpu;
-use cuesta::height::Field;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::texture::ground::Ground;
-use cuesta::texture::working_set::TileId;
-use cuesta::view::{Lens, View};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::plan::{Colour, Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::texture::ground::Ground;
+use cuesta::internal::texture::working_set::TileId;
+use cuesta::internal::view::{Lens, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use cuesta::height::synth;
-use cuesta::measure::picture::outline_radius;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::Scene;
-use cuesta::scene::holes::Truth;
-use cuesta::view::{Lens, Tolerance, View};
+use cuesta::internal::height::synth;
+use cuesta::internal::measure::picture::outline_radius;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::Scene;
+use cuesta::internal::scene::holes::Truth;
+use cuesta::internal::view::{Lens, Tolerance, View};
 use glam::DVec3;
 
 use super::{aslant, on_device};

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cuesta::draw::layout;
-use cuesta::gpu::shaders;
-use cuesta::lod::clusters;
+use cuesta::internal::draw::layout;
+use cuesta::internal::gpu::shaders;
+use cuesta::internal::lod::clusters;
 
 /// Returns the member offsets of every named struct of a module: struct name → member name → offset.
 fn offsets(words: &[u32]) -> BTreeMap<String, BTreeMap<String, u32>> {

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use cuesta::bench::device::DeviceBackend;
-use cuesta::bench::results::Results;
-use cuesta::bench::rows::Row;
-use cuesta::bench::run::{Ended, Run};
-use cuesta::bench::{BenchBackend, Case, Terrain, journal};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::TECHNIQUES;
-use cuesta::plan::Look;
+use cuesta::internal::bench::device::DeviceBackend;
+use cuesta::internal::bench::results::Results;
+use cuesta::internal::bench::rows::Row;
+use cuesta::internal::bench::run::{Ended, Run};
+use cuesta::internal::bench::{BenchBackend, Case, Terrain, journal};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{TECHNIQUES, Techniques};
+use cuesta::internal::plan::Look;
 
 use super::memory::{Work, drawn, measured};
 use super::{on_device, technique};
@@ -70,7 +70,7 @@ fn bench(gpu: &Arc<Gpu>, folder: &Path, (terrain, field): &(Terrain, Arc<Field>)
         let path = mock::case(terrain, name, 2.0, "certified", "spin");
         Case { size: [32, 20], frames: 2, every: 1, ..path }
     };
-    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default());
+    let mut backend = DeviceBackend::new(Arc::clone(gpu), Look::default(), Techniques::built_in());
     let fields = vec![(terrain.clone(), Arc::clone(field))];
     let (cases, stop) = (vec![case("geomipmap"), case("clusters")], AtomicBool::new(false));
     let header = mock::header(&mut backend as &mut dyn BenchBackend, &fields);

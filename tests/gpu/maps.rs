@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::gpu::Gpu;
-use cuesta::height::Field;
-use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::{Lens, View};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::Field;
+use cuesta::internal::plan::{Colour, Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::{Lens, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::{TECHNIQUES, Technique};
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::holes::Truth;
-use cuesta::scene::{Copy, Scene};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{TECHNIQUES, Technique};
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::holes::Truth;
+use cuesta::internal::scene::{Copy, Scene};
 
 use super::{aslant, on_device, technique};
 

@@ -26,12 +26,12 @@ mod soak;
 
 use std::sync::Arc;
 
-use cuesta::gpu::{Choice, Gpu, Instance};
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{RenderResult, Scene};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::gpu::{Choice, Gpu, Instance};
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::{RenderResult, Scene};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 /// Runs a test on a device under validation.

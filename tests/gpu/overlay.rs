@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::plan::{Colour, Look, ScenePlan};
-use cuesta::scene::{Copy, Scene};
-use cuesta::texture::drape::Drape;
-use cuesta::view::{Lens, View};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::plan::{Colour, Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene};
+use cuesta::internal::texture::drape::Drape;
+use cuesta::internal::view::{Lens, View};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 

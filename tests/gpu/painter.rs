@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::{DepthMode, DrawList};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::Technique;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::{DepthMode, DrawList};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::{Metric, Tolerance, View};
 
 use super::{aslant, mountains, on_device, render, technique};
 use crate::altered::Altered;

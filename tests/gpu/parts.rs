@@ -1,12 +1,12 @@
 //! Tests of frames drawn in parts, each submitted while the next one is selected: the image must be the same to the
 //! bit.
 
-use cuesta::bench::paths;
-use cuesta::draw::DrawList;
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::scene::Copy;
-use cuesta::view::{Metric, Tolerance};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::scene::Copy;
+use cuesta::internal::view::{Metric, Tolerance};
 
 use super::painter::renderer;
 use super::{mountains, on_device, technique};

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{Morph, PipelineRequirements};
-use cuesta::height::Field;
-use cuesta::plan::{Colour, DeviceLimits, FEATURES, Forced, Look, ScenePlan};
-use cuesta::scene::{Scene, savings};
+use cuesta::internal::draw::{Morph, PipelineRequirements};
+use cuesta::internal::height::Field;
+use cuesta::internal::plan::{Colour, DeviceLimits, FEATURES, Forced, Look, ScenePlan};
+use cuesta::internal::scene::{Scene, savings};
 
 use super::{as_f32, aslant, difference, mountains, on_device, render_planned, technique};
 
@@ -144,7 +144,7 @@ fn looks_differ_visibly() {
             ]);
         for look in looks {
             let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).build().unwrap();
-            let scene = cuesta::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
+            let scene = cuesta::internal::scene::Scene { gpu, field: &field, plan: &plan, look: &look, overlay: None };
             let mut geomipmap = technique(&field, "geomipmap", &["block=17"]);
             pictures.push((look, scene.render(geomipmap.as_mut(), &view, 1).unwrap().picture));
         }

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::layout::{ExplicitVertex, Frame, VertexNormals};
-use cuesta::draw::normals::explicit_normal;
-use cuesta::draw::place::{explicit_height, explicit_position, placed, relative_position};
-use cuesta::draw::skirts::is_skirted;
-use cuesta::draw::weights::{SkirtWeights, SlotWeights};
-use cuesta::draw::{DrawList, Instance, Morph, PipelineRequirements, Seams};
-use cuesta::gpu::Gpu;
-use cuesta::gpu::position_check::{self, Query};
-use cuesta::height::{Field, synth};
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::view::View;
+use cuesta::internal::draw::layout::{ExplicitVertex, Frame, VertexNormals};
+use cuesta::internal::draw::normals::explicit_normal;
+use cuesta::internal::draw::place::{explicit_height, explicit_position, placed, relative_position};
+use cuesta::internal::draw::skirts::is_skirted;
+use cuesta::internal::draw::weights::{SkirtWeights, SlotWeights};
+use cuesta::internal::draw::{DrawList, Instance, Morph, PipelineRequirements, Seams};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::gpu::position_check::{self, Query};
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::view::View;
 
 use super::{as_f32, aslant, mountains, on_device, technique};
 

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::weights::SkirtWeights;
-use cuesta::draw::{DrawList, Geometry, Limits, PipelineRequirements};
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::Technique;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::holes::{Truth, skirts as skirt_pixels};
-use cuesta::scene::{Copy, Scene};
-use cuesta::stress::views;
-use cuesta::view::View;
+use cuesta::internal::draw::weights::SkirtWeights;
+use cuesta::internal::draw::{DrawList, Geometry, Limits, PipelineRequirements};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::holes::{Truth, skirts as skirt_pixels};
+use cuesta::internal::scene::{Copy, Scene};
+use cuesta::internal::stress::views;
+use cuesta::internal::view::View;
 
 use super::{aslant, difference, on_device, render, technique};
 use crate::conformance::cases;

@@ -7,12 +7,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cuesta::gpu::Gpu;
-use cuesta::height::{Field, synth};
-use cuesta::lod::{TECHNIQUES, Technique};
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::scene::{Copy, Scene};
-use cuesta::view::{Lens, View};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::{TECHNIQUES, Technique};
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::scene::{Copy, Scene};
+use cuesta::internal::view::{Lens, View};
 use glam::DVec3;
 
 use super::{aslant, on_device, on_device_with, technique};
@@ -41,7 +41,7 @@ impl Random {
 
 /// Returns every technique and variant with defaults, and chunk settings short of time or memory.
 fn forms() -> Vec<(String, Vec<&'static str>)> {
-    let of = |entry: &'static cuesta::lod::Entry| {
+    let of = |entry: &'static cuesta::internal::lod::Entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{}", entry.name, variant.name));
         std::iter::once(entry.name.to_string()).chain(variants)
     };

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use cuesta::height::{Encoding, Options, Samples, load_bytes};
+use cuesta::internal::height::{Encoding, Options, Samples, load_bytes};
 use fastrand::Rng;
 use png::{BitDepth, ColorType};
 

@@ -1,6 +1,6 @@
 //! Units of coordinates and heights, by EPSG codes and by the units that keys declare.
 
-use cuesta::height::{Loaded, Options, load_bytes, load_bytes_with};
+use cuesta::internal::height::{Loaded, Options, load_bytes, load_bytes_with};
 
 use super::{
     tiff_file::{Tag, TiffFile},

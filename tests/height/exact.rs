@@ -1,6 +1,6 @@
 //! Files of every format and layout are read back exactly.
 
-use cuesta::height::{Field, Loaded, Options, Samples, load_bytes};
+use cuesta::internal::height::{Field, Loaded, Options, Samples, load_bytes};
 use png::{BitDepth, ColorType};
 
 use super::{

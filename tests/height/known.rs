@@ -1,6 +1,6 @@
 //! Files that are recognised and not read, and SRTM tiles of unusual sizes and names.
 
-use cuesta::height::{Options, load, load_bytes, metres_per_degree};
+use cuesta::internal::height::{Options, load, load_bytes, metres_per_degree};
 use tempfile::tempdir;
 
 use super::tiny;

@@ -1,6 +1,6 @@
 //! LZW as programs write it around a change of the code width, with an end code or without.
 
-use cuesta::height::{Options, load_bytes};
+use cuesta::internal::height::{Options, load_bytes};
 
 use super::tiff_file::{LZW, NONE, TiffFile};
 

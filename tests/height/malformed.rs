@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use cuesta::height::{Options, load_bytes};
+use cuesta::internal::height::{Options, load_bytes};
 
 use super::{
     tiff_file::{DEFLATE, NONE, Tag, TiffFile},
@@ -192,6 +192,7 @@ fn a_picture_that_claims_too_much_is_refused() {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
     drop(encoder.write_header().unwrap());
-    let error = cuesta::height::load_bytes("a.png", &bytes, &cuesta::height::Options::default()).unwrap_err();
+    let error = cuesta::internal::height::load_bytes("a.png", &bytes, &cuesta::internal::height::Options::default())
+        .unwrap_err();
     assert!(error.to_string().contains("a.png: length: expected data of 32768 x 32768 samples"), "{error}");
 }

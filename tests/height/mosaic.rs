@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use cuesta::height::{Field, Loaded, Options, load, load_all, load_bytes};
+use cuesta::internal::height::{Field, Loaded, Options, load, load_all, load_bytes};
 use tempfile::{TempDir, tempdir};
 
 use super::{
@@ -33,7 +33,7 @@ fn folder(files: &[(&str, Vec<u8>)]) -> TempDir {
     folder
 }
 
-fn load_names(folder: &Path, names: &[&str], options: &Options) -> Result<Loaded, cuesta::height::Error> {
+fn load_names(folder: &Path, names: &[&str], options: &Options) -> Result<Loaded, cuesta::internal::height::Error> {
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     load_all(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), options)
 }
@@ -69,7 +69,7 @@ fn three_tiles_are_one_field_however_they_come() {
     assert!(field.is_hole(1201, 1199) && field.is_hole(2400, 0));
     assert_eq!(by_names.warnings, ["1440000 of 5764801 samples lie in no file and are holes"]);
     // Metres at the middle row of all, 11° north.
-    let [east, north] = cuesta::height::metres_per_degree(11.0).map(|metres| metres / 1200.0);
+    let [east, north] = cuesta::internal::height::metres_per_degree(11.0).map(|metres| metres / 1200.0);
     assert!((field.spacing[0] - east).abs() < 1e-9 && (field.spacing[1] - north).abs() < 1e-9, "{:?}", field.spacing);
 
     let origins: Vec<[u32; 2]> = by_names.sources.iter().map(|source| source.at).collect();
@@ -367,7 +367,7 @@ fn a_pipe_in_a_tile_folder_is_refused() {
     fs::create_dir_all(folder.path().join("1/0")).unwrap();
     let made = std::process::Command::new("mkfifo").arg(folder.path().join("1/0/0.png")).status();
     assert!(made.expect("mkfifo").success());
-    let options = Options { encoding: Some(cuesta::height::Encoding::Mapbox), ..Options::default() };
+    let options = Options { encoding: Some(cuesta::internal::height::Encoding::Mapbox), ..Options::default() };
     let error = load(folder.path(), &options).unwrap_err().to_string();
     assert!(error.contains("0.png") && error.contains("neither a file nor a directory"), "{error}");
 }

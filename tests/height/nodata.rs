@@ -1,6 +1,6 @@
 //! The meaning of "no data": texts of files, and values that are no heights.
 
-use cuesta::height::{Loaded, Options, Samples, load_bytes, load_bytes_with};
+use cuesta::internal::height::{Loaded, Options, Samples, load_bytes, load_bytes_with};
 
 use super::tiff_file::{Tag, TiffFile};
 use super::tiny::{self, SIZE};

@@ -1,6 +1,6 @@
 //! Holes, warnings and options.
 
-use cuesta::height::{HoleFill, Loaded, Options, load_bytes};
+use cuesta::internal::height::{HoleFill, Loaded, Options, load_bytes};
 
 use super::{
     tiff_file::{Tag, TiffFile},
@@ -111,7 +111,7 @@ fn crop_tile_and_scale() {
 #[test]
 fn raw_layouts() {
     for text in ["5x4", "5x4:u8", "x4:u16le", "5x-4:f32be", "5x4:u16le "] {
-        assert!(text.parse::<cuesta::height::RawLayout>().is_err(), "{text}");
+        assert!(text.parse::<cuesta::internal::height::RawLayout>().is_err(), "{text}");
     }
     for (text, bytes) in [
         ("2x2:u16le", vec![1, 0, 2, 0, 3, 0, 4, 0]),

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use cuesta::height::{Field, Options, load, load_bytes, load_bytes_with, metres_per_degree};
+use cuesta::internal::height::{Field, Options, load, load_bytes, load_bytes_with, metres_per_degree};
 
 use super::{
     tiff_file::{Tag, TiffFile},

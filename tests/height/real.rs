@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cuesta::height::{self, Encoding, Loaded, Options};
+use cuesta::internal::height::{self, Encoding, Loaded, Options};
 
 /// Returns the path of a shared data file; `None`, with a message, if the files are absent.
 pub fn shared(file: &str) -> Option<PathBuf> {

@@ -1,6 +1,6 @@
 //! World files, `.prj` and `.aux.xml` beside a raster; turns, rotations; scale and offset.
 
-use cuesta::height::{Field, Loaded, Options, load, load_bytes, load_bytes_with};
+use cuesta::internal::height::{Field, Loaded, Options, load, load_bytes, load_bytes_with};
 use png::{BitDepth, ColorType};
 
 use super::{

@@ -1,6 +1,6 @@
 //! ASCII grids as programs and countries write them.
 
-use cuesta::height::{Field, Holes, Options, Samples, load, load_bytes, load_bytes_with};
+use cuesta::internal::height::{Field, Holes, Options, Samples, load, load_bytes, load_bytes_with};
 
 use super::{real::shared, tiny};
 

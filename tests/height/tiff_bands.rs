@@ -1,6 +1,6 @@
 //! Bands of a TIFF: heights, colours, opacity and masks.
 
-use cuesta::height::{Encoding, Loaded, Options, load_bytes};
+use cuesta::internal::height::{Encoding, Loaded, Options, load_bytes};
 
 use super::tiff_file::{DEFLATE, NONE, Tag, TiffFile, chained};
 

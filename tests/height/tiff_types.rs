@@ -1,6 +1,6 @@
 //! TIFF samples of every width, and compressions that are not read.
 
-use cuesta::height::{Field, Options, load_bytes};
+use cuesta::internal::height::{Field, Options, load_bytes};
 
 use super::tiff_file::{DEFLATE, LZW, NONE, Tag, TiffFile, ZSTD};
 

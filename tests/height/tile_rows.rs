@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use cuesta::height::{Encoding, Loaded, Options, load, metres_per_degree};
+use cuesta::internal::height::{Encoding, Loaded, Options, load, metres_per_degree};
 use tempfile::{TempDir, tempdir};
 
 use super::real::shared;

@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, Write};
 
-use cuesta::height::{Loaded, Options, load_bytes_with};
+use cuesta::internal::height::{Loaded, Options, load_bytes_with};
 
 use super::tiff_file::{DEFLATE, TiffFile, ZSTD};
 
@@ -28,12 +28,12 @@ impl Tiny {
     }
 
     /// Reads other bytes in place of the file's, and of the header's.
-    pub fn load_as(&self, bytes: &[u8], hdr: Option<&[u8]>) -> Result<Loaded, cuesta::height::Error> {
+    pub fn load_as(&self, bytes: &[u8], hdr: Option<&[u8]>) -> Result<Loaded, cuesta::internal::height::Error> {
         let sibling = |extension: &str| hdr.filter(|_| extension == "hdr").map(<[u8]>::to_vec);
         load_bytes_with(self.name, bytes, &sibling, &self.options)
     }
 
-    pub fn load(&self) -> Result<Loaded, cuesta::height::Error> {
+    pub fn load(&self) -> Result<Loaded, cuesta::internal::height::Error> {
         self.load_as(&self.bytes, self.hdr.as_deref())
     }
 }

@@ -1,8 +1,8 @@
 //! The budget controller against simulated costs: loads that step, ramp, spike and oscillate; curves from nearly flat
 //! to slopes of 10⁴, and staircases; late and noisy costs.
 
-use cuesta::lod::budget::{RANGE_PX, Target};
-use cuesta::stress::simulated_loads::{COST, EVENT, Load, constant, overshoot, power, settling, step};
+use cuesta::internal::lod::budget::{RANGE_PX, Target};
+use cuesta::internal::stress::simulated_loads::{COST, EVENT, Load, constant, overshoot, power, settling, step};
 
 /// Starts that are too coarse and too fine, and loads that step up and down: `(name, frame of the event, first px,
 /// load)`.

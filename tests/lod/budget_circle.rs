@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::DrawList;
-use cuesta::height::{Field, synth};
-use cuesta::lod::budget::{Controller, RANGE_PX, Target};
-use cuesta::view::{Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::budget::{Controller, RANGE_PX, Target};
+use cuesta::internal::view::{Metric, Tolerance, View};
 use rayon::prelude::*;
 
 use super::technique;

@@ -3,19 +3,19 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::weights::SlotWeights;
-use cuesta::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology};
-use cuesta::height::bounds::{Bounds, Measure};
-use cuesta::height::progress::Progress;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::Technique;
-use cuesta::lod::clusters::mesh::Mesh;
-use cuesta::measure::{geometric, watertight};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::weights::SlotWeights;
+use cuesta::internal::draw::{Draw, DrawList, Instance, Seams, Source, Submission, Topology};
+use cuesta::internal::height::bounds::{Bounds, Measure};
+use cuesta::internal::height::progress::Progress;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::lod::clusters::mesh::Mesh;
+use cuesta::internal::measure::{geometric, watertight};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 use super::{heights, technique};

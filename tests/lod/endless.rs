@@ -4,14 +4,14 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::draw::place::explicit_height;
-use cuesta::draw::{DrawList, ExplicitVertex};
-use cuesta::height::Field;
-use cuesta::height::bezier::{Bezier, LAYERS, SIDE_M, SPACING_M};
-use cuesta::lod::Technique;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::place::explicit_height;
+use cuesta::internal::draw::{DrawList, ExplicitVertex};
+use cuesta::internal::height::Field;
+use cuesta::internal::height::bezier::{Bezier, LAYERS, SIDE_M, SPACING_M};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 
 const TOLERANCE_PX: f64 = 8.0;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, expand};
-use cuesta::height::synth::{Kind, synth};
-use cuesta::height::{Field, MAX_SIDE};
-use cuesta::lod::{self, Settings};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DrawList, expand};
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::height::{Field, MAX_SIDE};
+use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 /// Returns views near the last corner, out of the field, down and into it, near the first corner, and over the middle.

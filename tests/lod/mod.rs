@@ -19,12 +19,12 @@ mod strips_order;
 
 use std::sync::Arc;
 
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, Geometry};
-use cuesta::height::{Field, surface};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::View;
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DrawList, Geometry};
+use cuesta::internal::height::{Field, surface};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::View;
 
 /// Builds a technique, or a variant given as `technique:variant`, with settings given as `key=value`.
 fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::weights::{ONE, SlotWeights};
-use cuesta::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
-use cuesta::height::{Field, synth};
-use cuesta::lod::geomipmap::mesh::{BlockMesh, Masks};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::weights::{ONE, SlotWeights};
+use cuesta::internal::draw::{Draw, DrawList, Geometry, Instance, Source, Topology};
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::geomipmap::mesh::{BlockMesh, Masks};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 use super::{heights, technique};

@@ -3,11 +3,11 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-use cuesta::draw::expand;
-use cuesta::draw::layout::Frame;
-use cuesta::height::synth;
-use cuesta::lod::{Need, TECHNIQUES, Values};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::height::synth;
+use cuesta::internal::lod::{Need, TECHNIQUES, Values};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::technique;
 
@@ -37,7 +37,7 @@ fn flown(name: &str, settings: &[String]) -> Vec<u64> {
             tolerance: Tolerance { px: 12.0, metric: Metric::Certified },
             time_s: 0.1 * f64::from(k),
         };
-        let mut list = cuesta::draw::DrawList::default();
+        let mut list = cuesta::internal::draw::DrawList::default();
         technique.select(&view, &mut list);
         let (placing, resident) = (Frame::placing(&field, &view), technique.resident());
         let mut hasher = DefaultHasher::new();

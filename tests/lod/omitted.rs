@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::lod::{self, Settings};
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::lod::{self, Settings};
 
 fn prepared(field: &Arc<Field>, name: &str, setting: (&str, &str)) -> Box<dyn lod::Technique> {
     let entry = lod::find(name).unwrap();

@@ -1,14 +1,14 @@
 //! Vertices of quadrants with skirts are placed by equations 3 and 4 of Judnich & Ling.
 
-use cuesta::draw::layout::Frame;
-use cuesta::draw::place::placed;
-use cuesta::draw::skirts::{self, SKIRT};
-use cuesta::draw::weights::{FINER, ONE, SkirtWeights};
-use cuesta::draw::{Instance, Seams};
-use cuesta::height::surface::{Corner, doubled_area};
-use cuesta::height::{Field, Holes, Samples, rtin};
-use cuesta::lod::clusters::mesh::Mesh;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::place::placed;
+use cuesta::internal::draw::skirts::{self, SKIRT};
+use cuesta::internal::draw::weights::{FINER, ONE, SkirtWeights};
+use cuesta::internal::draw::{Instance, Seams};
+use cuesta::internal::height::surface::{Corner, doubled_area};
+use cuesta::internal::height::{Field, Holes, Samples, rtin};
+use cuesta::internal::lod::clusters::mesh::Mesh;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 fn rough() -> Field {
@@ -60,7 +60,7 @@ fn vertices_follow_their_quadrants_alpha() {
     let (mut compared, mut skirt_vertex) = (0, 0);
     for (k, rotation) in (0..2).flat_map(|k| (0..4).map(move |rotation| (k, rotation))) {
         // The quadrants after rotation, and the morph weight of each towards the next coarser level.
-        let state = cuesta::lod::clusters::states::rotated(states[k], rotation);
+        let state = cuesta::internal::lod::clusters::states::rotated(states[k], rotation);
         let gone = [5u32, 63, 17, 40].map(|weight| (weight + 11 * rotation) % ONE);
         let inside = [0, 1, 2, 3].map(|quadrant: usize| {
             let finer = if state[quadrant] == 2 { FINER } else { 0 };
@@ -73,7 +73,8 @@ fn vertices_follow_their_quadrants_alpha() {
         for &index in &mesh.geometry.indices[mesh.ranges[k].start as usize..mesh.ranges[k].end as usize] {
             let position = mesh.geometry.lattice[index as usize].position;
             let found = placed(&field, &frame, &instance, position);
-            let vertex = skirts::skirt_vertex(&instance, cuesta::draw::place::turned_position(&instance, position));
+            let vertex =
+                skirts::skirt_vertex(&instance, cuesta::internal::draw::place::turned_position(&instance, position));
             let left = 1.0 - f64::from(gone[vertex.quadrant]) / f64::from(ONE);
             // From low to normal resolution, or from normal to double.
             let alpha = if state[vertex.quadrant] == 1 { 0.5 * left } else { 0.5 + 0.5 * left };

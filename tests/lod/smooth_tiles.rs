@@ -4,14 +4,14 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use cuesta::bench::paths;
-use cuesta::draw::layout::Frame;
-use cuesta::draw::weights::{ONE, Slot, SlotWeights};
-use cuesta::draw::{DrawList, expand};
-use cuesta::height::{Field, Holes, Samples, synth};
-use cuesta::lod::Technique;
-use cuesta::measure::{geometric, watertight};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::weights::{ONE, Slot, SlotWeights};
+use cuesta::internal::draw::{DrawList, expand};
+use cuesta::internal::height::{Field, Holes, Samples, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::measure::{geometric, watertight};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DrawList, ExplicitVertex, Geometry, Source, Upload, expand};
-use cuesta::height::progress::Progress;
-use cuesta::height::synth::{self, Kind};
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::sphere_tree::bounding_spheres::BoundingSpheres;
-use cuesta::lod::sphere_tree::covers::Covers;
-use cuesta::lod::sphere_tree::diamond_info::DiamondInfo;
-use cuesta::lod::sphere_tree::front::{CrossingTracker, Follower};
-use cuesta::lod::sphere_tree::lattice::Place;
-use cuesta::lod::sphere_tree::measure::Measured;
-use cuesta::lod::sphere_tree::reach::{Reach, Viewpoint};
-use cuesta::lod::sphere_tree::roam::Queues;
-use cuesta::lod::sphere_tree::splits::{Found, Splits};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DrawList, ExplicitVertex, Geometry, Source, Upload, expand};
+use cuesta::internal::height::progress::Progress;
+use cuesta::internal::height::synth::{self, Kind};
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::lod::sphere_tree::bounding_spheres::BoundingSpheres;
+use cuesta::internal::lod::sphere_tree::covers::Covers;
+use cuesta::internal::lod::sphere_tree::diamond_info::DiamondInfo;
+use cuesta::internal::lod::sphere_tree::front::{CrossingTracker, Follower};
+use cuesta::internal::lod::sphere_tree::lattice::Place;
+use cuesta::internal::lod::sphere_tree::measure::Measured;
+use cuesta::internal::lod::sphere_tree::reach::{Reach, Viewpoint};
+use cuesta::internal::lod::sphere_tree::roam::Queues;
+use cuesta::internal::lod::sphere_tree::splits::{Found, Splits};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 /// Deterministic random numbers.

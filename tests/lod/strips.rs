@@ -1,15 +1,15 @@
 //! Sorted strips: watertight for any level function, with triangles in front-to-back order.
 
-use cuesta::draw::expand::Drawn;
-use cuesta::height::surface::Corner;
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::lod::sorted_strips::blend::Blend;
-use cuesta::lod::sorted_strips::context::WalkContext;
-use cuesta::lod::sorted_strips::pages::{Grid, Pages, TraversalDirection};
-use cuesta::lod::sorted_strips::shapes::Shapes;
-use cuesta::lod::sorted_strips::splits::{Levels, Splits};
-use cuesta::measure::watertight;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::surface::Corner;
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::lod::sorted_strips::blend::Blend;
+use cuesta::internal::lod::sorted_strips::context::WalkContext;
+use cuesta::internal::lod::sorted_strips::pages::{Grid, Pages, TraversalDirection};
+use cuesta::internal::lod::sorted_strips::shapes::Shapes;
+use cuesta::internal::lod::sorted_strips::splits::{Levels, Splits};
+use cuesta::internal::measure::watertight;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -232,7 +232,7 @@ fn blended_heights(field: &std::sync::Arc<Field>, settings: &[&str], steps: u32)
             size: [320, 200],
             ..empty_view()
         };
-        let mut list = cuesta::draw::DrawList::default();
+        let mut list = cuesta::internal::draw::DrawList::default();
         strips.select(&view, &mut list);
         watertight::prove_list(field, &view, strips.pipeline_requirements().seams, strips.resident(), &list).unwrap();
         super::heights(field, &view, strips.resident(), &list)
@@ -250,7 +250,8 @@ fn changes(heights: &[Vec<f64>]) -> [f64; 2] {
 
 #[test]
 fn morphing_strips_do_not_jump() {
-    let mut field = cuesta::height::synth::synth(cuesta::height::synth::Kind::Fractal, [129, 129], 5);
+    let mut field =
+        cuesta::internal::height::synth::synth(cuesta::internal::height::synth::Kind::Fractal, [129, 129], 5);
     field.spacing = [20.0, 20.0];
     let field = std::sync::Arc::new(field);
     for page in ["page=16", "page=64"] {
@@ -267,7 +268,8 @@ fn morphing_strips_do_not_jump() {
 /// Checks that sliding vertices lie on the edge of the next level that contains them, and that its ends do not move.
 #[test]
 fn sliding_vertices_stay_on_edges_of_the_next_level() {
-    let mut field = cuesta::height::synth::synth(cuesta::height::synth::Kind::Fractal, [257, 200], 5);
+    let mut field =
+        cuesta::internal::height::synth::synth(cuesta::internal::height::synth::Kind::Fractal, [257, 200], 5);
     field.spacing = [20.0, 30.0];
     let field = std::sync::Arc::new(field);
     let [w, h] = field.size().map(|n| f64::from(n - 1));
@@ -284,13 +286,13 @@ fn sliding_vertices_stay_on_edges_of_the_next_level() {
                 size: [640, 400],
                 ..empty_view()
             };
-            let mut list = cuesta::draw::DrawList::default();
+            let mut list = cuesta::internal::draw::DrawList::default();
             strips.select(&view, &mut list);
             watertight::prove_list(&field, &view, strips.pipeline_requirements().seams, strips.resident(), &list)
                 .unwrap_or_else(|why| panic!("{edge} {view:?}: {why}"));
             let unit = 1 << list.fraction_bits;
-            let at = |v: &cuesta::draw::ExplicitVertex| v.position.map(|n| f64::from(n) / f64::from(unit));
-            let stands = |v: &&cuesta::draw::ExplicitVertex| v.morph == 0.0;
+            let at = |v: &cuesta::internal::draw::ExplicitVertex| v.position.map(|n| f64::from(n) / f64::from(unit));
+            let stands = |v: &&cuesta::internal::draw::ExplicitVertex| v.morph == 0.0;
             let still: std::collections::HashSet<_> =
                 list.streamed.vertices.iter().filter(stands).map(|v| v.position).collect();
             for vertex in list.streamed.vertices.iter().filter(|v| v.morph > 0.0) {

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::height::cave::Cave;
-use cuesta::height::{Field, Holes, Samples, rtin, surface};
-use cuesta::lod::sorted_strips::cave::CaveStrips;
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::measure::watertight::cave::{CaveProof, prove_cave};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::height::cave::Cave;
+use cuesta::internal::height::{Field, Holes, Samples, rtin, surface};
+use cuesta::internal::lod::sorted_strips::cave::CaveStrips;
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::measure::watertight::cave::{CaveProof, prove_cave};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 use rayon::prelude::*;
 

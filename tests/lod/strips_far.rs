@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::height::{Field, synth};
-use cuesta::lod::Technique;
-use cuesta::measure::watertight::{self, Kind};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::measure::watertight::{self, Kind};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::technique;
 

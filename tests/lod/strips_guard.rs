@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::height::synth;
-use cuesta::measure::pop;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::height::synth;
+use cuesta::internal::measure::pop;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 use super::technique;

@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use cuesta::bench::paths;
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::draw::{DepthMode, DrawList, Geometry};
-use cuesta::height::{Field, surface, synth};
-use cuesta::lod::Technique;
-use cuesta::measure::watertight;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::bench::paths;
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::draw::{DepthMode, DrawList, Geometry};
+use cuesta::internal::height::{Field, surface, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::measure::watertight;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 

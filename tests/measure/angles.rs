@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use cuesta::height::synth::{self, Kind};
-use cuesta::measure::geometric::{self, ANGLES};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::height::synth::{self, Kind};
+use cuesta::internal::measure::geometric::{self, ANGLES};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 use super::{select, technique};

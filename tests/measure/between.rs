@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::draw::expand::Drawn;
-use cuesta::height::{Field, synth};
-use cuesta::measure::pop::{self, State};
-use cuesta::measure::watertight::{self, Kind};
-use cuesta::measure::{economy, geometric};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::measure::pop::{self, State};
+use cuesta::internal::measure::watertight::{self, Kind};
+use cuesta::internal::measure::{economy, geometric};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::{drawn, select, technique};
 
@@ -92,7 +92,7 @@ fn faults_of_parts_of_a_sample_are_found() {
         if around.len() < 6 {
             continue;
         }
-        let changed = |of: &[usize], change: &dyn Fn(&mut cuesta::height::surface::Corner)| {
+        let changed = |of: &[usize], change: &dyn Fn(&mut cuesta::internal::height::surface::Corner)| {
             let mut changed = triangles.clone();
             for &k in of {
                 let n = corner_at(&changed[k], vertex.position).expect("one of its own");
@@ -118,7 +118,7 @@ fn faults_of_parts_of_a_sample_are_found() {
 fn a_junction_between_samples_is_found() {
     let field = terrain();
     let view = view(&field, 8.0);
-    let corner = |x: i32, z: i32| cuesta::height::surface::Corner { x, z, y: 1.0 };
+    let corner = |x: i32, z: i32| cuesta::internal::height::surface::Corner { x, z, y: 1.0 };
     let [last_x, last_z] = field.size().map(|n| (n as i32 - 1) << 6);
     // The whole field in two triangles, the second one cut at a place of the diagonal that is no sample's.
     let inner = corner(5 * 200, 5 * 169);

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::expand::Drawn;
-use cuesta::height::surface::{Corner, doubled_area};
-use cuesta::height::{Field, demo, synth};
-use cuesta::measure::watertight::{self, CounterExample, Kind, plan};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::surface::{Corner, doubled_area};
+use cuesta::internal::height::{Field, demo, synth};
+use cuesta::internal::measure::watertight::{self, CounterExample, Kind, plan};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::{drawn, select, technique};
 

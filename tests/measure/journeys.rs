@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use cuesta::bench::paths::PATHS;
-use cuesta::height::{self, Field, Options};
-use cuesta::measure::{geometric, watertight};
-use cuesta::view::{Metric, Tolerance};
+use cuesta::internal::bench::paths::PATHS;
+use cuesta::internal::height::{self, Field, Options};
+use cuesta::internal::measure::{geometric, watertight};
+use cuesta::internal::view::{Metric, Tolerance};
 
 use super::{drawn, select, technique};
 

@@ -10,12 +10,12 @@ mod rays;
 
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::height::Field;
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::view::View;
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::height::Field;
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::view::View;
 
 /// A technique of the table with settings given as pairs.
 fn technique(field: &Arc<Field>, name: &str, settings: &[(&str, &str)]) -> Box<dyn Technique> {

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use cuesta::draw::expand::Drawn;
-use cuesta::height::Field;
-use cuesta::height::synth::{self, Kind};
-use cuesta::measure::peers::Pool;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::{self, Kind};
+use cuesta::internal::measure::peers::Pool;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -44,7 +44,8 @@ fn poses() -> Option<Vec<View>> {
 fn depth(field: &Field, view: &View, triangles: &[Drawn]) -> Vec<f32> {
     let [width, height] = view.size.map(|n| n as usize);
     let mut depth = vec![0f32; width * height];
-    let project = |c: cuesta::height::surface::Corner| view.project(field.world_at(c.x.into(), c.z.into(), c.y.into()));
+    let project =
+        |c: cuesta::internal::height::surface::Corner| view.project(field.world_at(c.x.into(), c.z.into(), c.y.into()));
     let seen: Vec<[(DVec2, f64); 3]> = triangles
         .par_iter()
         .filter_map(|t| {

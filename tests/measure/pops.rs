@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use cuesta::draw::expand::Drawn;
-use cuesta::height::synth::{self, Kind};
-use cuesta::height::{Field, surface};
-use cuesta::measure::in_view;
-use cuesta::measure::pop::{self, Pop, State};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::synth::{self, Kind};
+use cuesta::internal::height::{Field, surface};
+use cuesta::internal::measure::in_view;
+use cuesta::internal::measure::pop::{self, Pop, State};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 use super::{drawn, select, technique};

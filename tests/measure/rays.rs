@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use cuesta::height::{Field, Holes, Samples};
-use cuesta::measure::geometric::{self, ANGLES, Summary};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::height::{Field, Holes, Samples};
+use cuesta::internal::measure::geometric::{self, ANGLES, Summary};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -152,7 +152,7 @@ fn compare(name: &str, settings: &[(&str, &str)]) -> (usize, usize, f64) {
     while compared < 20 {
         let view = random_view(&mut random);
         let list = select(&mut *technique, &view);
-        let world = |c: cuesta::height::surface::Corner| field.world_at(c.x.into(), c.z.into(), c.y.into());
+        let world = |c: cuesta::internal::height::surface::Corner| field.world_at(c.x.into(), c.z.into(), c.y.into());
         let drawn = drawn(&field, &view, &*technique, &list);
         let triangles: Vec<_> = drawn.iter().map(|t| t.corners.map(world)).collect();
         let rays = by_rays(&field, &view, &triangles);

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{Draw, DrawList, Geometry, Limits, Submission};
-use cuesta::gpu::Gpu;
-use cuesta::gpu::probe::{Counts, DRAWS};
-use cuesta::height::{Field, synth};
-use cuesta::lod::Technique;
-use cuesta::plan::{Look, ScenePlan};
-use cuesta::profile::{self, Form, Profile, timeline, trace};
-use cuesta::scene::probed::ProbedFrame;
-use cuesta::scene::{Copy, Scene, SceneRenderer};
-use cuesta::view::View;
+use cuesta::internal::draw::{Draw, DrawList, Geometry, Limits, Submission};
+use cuesta::internal::gpu::Gpu;
+use cuesta::internal::gpu::probe::{Counts, DRAWS};
+use cuesta::internal::height::{Field, synth};
+use cuesta::internal::lod::Technique;
+use cuesta::internal::plan::{Look, ScenePlan};
+use cuesta::internal::profile::{self, Form, Profile, timeline, trace};
+use cuesta::internal::scene::probed::ProbedFrame;
+use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
+use cuesta::internal::view::View;
 
 use super::trace_format::{self, Slice};
 use crate::gpu::{aslant, mountains, on_device, technique};

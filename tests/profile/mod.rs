@@ -4,7 +4,7 @@
 mod device;
 pub mod trace_format;
 
-use cuesta::profile::trace::{Counter, Slice, Track, document};
+use cuesta::internal::profile::trace::{Counter, Slice, Track, document};
 use serde_json::{Map, Value, json};
 
 fn slice(name: &str, start_us: f64, end_us: f64) -> Slice {

@@ -1,6 +1,6 @@
 //! README and the guide list the same techniques, settings and subcommands as the tables.
 
-use cuesta::lod::TECHNIQUES;
+use cuesta::internal::lod::TECHNIQUES;
 
 const README: &str = include_str!("../../README.md");
 const GUIDE: &str = include_str!("../../docs/guide.md");
@@ -36,7 +36,7 @@ fn every_technique_variant_and_setting_is_named_and_no_other() {
 
 #[test]
 fn every_subcommand_is_shown() {
-    for command in cuesta::cli::command().get_subcommands() {
+    for command in cuesta::internal::cli::command().get_subcommands() {
         assert!(GUIDE.contains(&format!("cuesta {}", command.get_name())), "{}", command.get_name());
     }
 }

@@ -164,7 +164,7 @@ fn the_page_works_in_a_browser() {
 
 /// Hovering shows the value that the results hold, at the place that the axes say.
 fn values_are_read_back(browser: &mut Browser, folder: &Path) {
-    let results = cuesta::bench::results::Results::read(folder).unwrap();
+    let results = cuesta::internal::bench::results::Results::read(folder).unwrap();
     let result = results.cases.iter().find(|r| r.case.series() == "geomipmap").unwrap();
     let frame_ms = result.time.as_ref().unwrap().frame_ms.value;
     let error_px = result.errors.as_ref().unwrap().error_px.max;

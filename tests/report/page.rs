@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use cuesta::bench::journal::ROWS;
-use cuesta::bench::results::Results;
-use cuesta::bench::run::Run;
-use cuesta::report;
+use cuesta::internal::bench::journal::ROWS;
+use cuesta::internal::bench::results::Results;
+use cuesta::internal::bench::run::Run;
+use cuesta::internal::report;
 
 use crate::bench::mock::{self, Mock};
 

@@ -1,12 +1,12 @@
 //! Tests of the stress suite: it finds broken techniques, reports where they fail and saves counter-examples.
 
-use cuesta::draw::{DrawList, Geometry, Limits};
-use cuesta::height::{Options, load};
-use cuesta::lod::{Entry, Technique, geomipmap};
-use cuesta::stress::jitter::{Jitter, LIMIT_PX, VertexPlacement};
-use cuesta::stress::rows::{FILE, Row, SCHEMA, Stress};
-use cuesta::stress::{Case, CaseRun, Finding, Kind, TechniqueConfig, cases, forms, saved};
-use cuesta::view::View;
+use cuesta::internal::draw::{DrawList, Geometry, Limits};
+use cuesta::internal::height::{Options, load};
+use cuesta::internal::lod::{Entry, Technique, Techniques, geomipmap};
+use cuesta::internal::stress::jitter::{Jitter, LIMIT_PX, VertexPlacement};
+use cuesta::internal::stress::rows::{FILE, Row, SCHEMA, Stress};
+use cuesta::internal::stress::{Case, CaseRun, Finding, Kind, TechniqueConfig, cases, forms, saved};
+use cuesta::internal::view::View;
 
 use crate::altered::BLOCK_LOST;
 
@@ -32,7 +32,8 @@ static PANICS: Entry =
     Entry { name: "panics", build: |_, _| Box::new(Panics(Geometry::default())), ..geomipmap::ENTRY };
 
 fn config(entry: &'static Entry) -> TechniqueConfig {
-    let [config] = forms::with_defaults(&["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
+    let [config] =
+        forms::with_defaults(&Techniques::built_in(), &["geomipmap".to_string()]).unwrap().try_into().ok().unwrap();
     TechniqueConfig { entry, name: entry.name.to_string(), ..config }
 }
 
@@ -140,7 +141,7 @@ fn results_survive_a_round_trip_and_become_a_page() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(FILE), serde_json::to_vec(&stress).unwrap()).unwrap();
     assert_eq!(Stress::read(folder.path()).unwrap(), stress);
-    let page = std::fs::read_to_string(cuesta::report::write_stress(folder.path()).unwrap()).unwrap();
+    let page = std::fs::read_to_string(cuesta::internal::report::write_stress(folder.path()).unwrap()).unwrap();
     for part in ["1 checks passed, 1 failed", "1 of 2", "a gap &amp; a crack", "flat &lt;b&gt;"] {
         assert!(page.contains(part), "{part}");
     }

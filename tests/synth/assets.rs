@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use cuesta::height::demo::{KIND, OVERLAY, SEED, SIZE, demo};
-use cuesta::height::save::save;
-use cuesta::height::synth::overlay::overlay;
-use cuesta::height::synth::synth;
+use cuesta::internal::height::demo::{KIND, OVERLAY, SEED, SIZE, demo};
+use cuesta::internal::height::save::save;
+use cuesta::internal::height::synth::overlay::overlay;
+use cuesta::internal::height::synth::synth;
 use image::codecs::jpeg::JpegEncoder;
 
 #[test]

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use cuesta::height::synth::{KINDS, Kind, synth};
-use cuesta::height::{Field, Samples};
+use cuesta::internal::height::synth::{KINDS, Kind, synth};
+use cuesta::internal::height::{Field, Samples};
 use sha2::{Digest, Sha256};
 
 /// Returns the SHA-256 of the samples in memory, little-endian, in hexadecimal.

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use cuesta::height::save::{Codes, save};
-use cuesta::height::synth::{Kind, synth};
-use cuesta::height::{Field, Holes, Samples};
+use cuesta::internal::height::save::{Codes, save};
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::height::{Field, Holes, Samples};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 

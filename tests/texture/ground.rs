@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use cuesta::draw::{DrawList, Geometry};
-use cuesta::height::Field;
-use cuesta::height::synth::{Kind, synth};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::texture::virtual_ground::{VirtualGround, VirtualGroundLayout};
-use cuesta::texture::virtual_overlay::VirtualTextureStats;
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::{DrawList, Geometry};
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::{Kind, synth};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::texture::virtual_ground::{VirtualGround, VirtualGroundLayout};
+use cuesta::internal::texture::virtual_overlay::VirtualTextureStats;
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
 const SIZE: [u32; 2] = [640, 360];

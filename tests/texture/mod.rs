@@ -5,19 +5,19 @@ mod ground;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use cuesta::draw::DrawList;
-use cuesta::draw::expand::{self, Drawn};
-use cuesta::draw::layout::Frame;
-use cuesta::height::synth::{self, Kind};
-use cuesta::height::{Field, surface};
-use cuesta::lod::{self, Settings, Technique};
-use cuesta::texture::hidden::Depths;
-use cuesta::texture::mip_spheres::MipSpheres;
-use cuesta::texture::pieces::{ClipPlanes, Clipper, Corner};
-use cuesta::texture::resolution::{level_by_exponent, texture_area};
-use cuesta::texture::wedges;
-use cuesta::texture::working_set::{Stop, Wedge, WorkingSet};
-use cuesta::view::{Lens, Metric, Tolerance, View};
+use cuesta::internal::draw::DrawList;
+use cuesta::internal::draw::expand::{self, Drawn};
+use cuesta::internal::draw::layout::Frame;
+use cuesta::internal::height::synth::{self, Kind};
+use cuesta::internal::height::{Field, surface};
+use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::texture::hidden::Depths;
+use cuesta::internal::texture::mip_spheres::MipSpheres;
+use cuesta::internal::texture::pieces::{ClipPlanes, Clipper, Corner};
+use cuesta::internal::texture::resolution::{level_by_exponent, texture_area};
+use cuesta::internal::texture::wedges;
+use cuesta::internal::texture::working_set::{Stop, Wedge, WorkingSet};
+use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 
 /// Cells along a side of the field and of its root square.

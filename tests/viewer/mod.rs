@@ -163,13 +163,14 @@ fn colour_modes(viewer: &Viewer, start: &RgbImage) {
 /// The window title names the technique, and a larger tolerance changes the levels.
 fn technique_and_tolerance(viewer: &Viewer, start: &RgbImage) {
     let title = || viewer.display.xdotool(&format!("getwindowname {}", viewer.window));
-    for (k, entry) in cuesta::lod::TECHNIQUES.iter().enumerate() {
+    for (k, entry) in cuesta::internal::lod::TECHNIQUES.iter().enumerate() {
         viewer.press(&format!("{}", k + 1));
         eventually("the title", || (title() == format!("cuesta: demo, {}", entry.name)).then_some(()));
         let drawn = viewer.screenshot();
         assert!(difference(start, &drawn) < 0.1, "{}: {}", entry.name, difference(start, &drawn));
     }
-    let geomipmap = cuesta::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
+    let geomipmap =
+        cuesta::internal::lod::TECHNIQUES.iter().position(|entry| entry.name == "geomipmap").expect("in the table");
     let fine = viewer.screenshot_after(&format!("{} l", geomipmap + 1));
     let coarse = viewer.screenshot_after("plus plus plus plus plus plus");
     assert!(difference(&fine, &coarse) > 0.1, "tolerance: {}", difference(&fine, &coarse));

@@ -15,7 +15,7 @@ use crate::gpu::shaders::Constants;
 use super::MakeInput;
 
 /// Pipeline and descriptors of one full-screen triangle.
-pub(in crate::gpu) struct Fullscreen {
+pub(in crate::internal::gpu) struct Fullscreen {
     gpu: Arc<Gpu>,
     bindings: Bindings,
     pipeline: vk::Pipeline,

@@ -38,7 +38,7 @@ impl Crs {
 }
 
 /// The system of an EPSG code: projected, geographic, compound or vertical.
-pub(in crate::height) fn from_epsg(code: u32) -> Option<Crs> {
+pub(in crate::internal::height) fn from_epsg(code: u32) -> Option<Crs> {
     let name = Some(format!("EPSG:{code}"));
     if WEB_MERCATOR.contains(&code) {
         return Some(Crs { unit: Some(Unit::Mercator), name, ..Crs::default() });
@@ -54,7 +54,7 @@ pub(in crate::height) fn from_epsg(code: u32) -> Option<Crs> {
 }
 
 /// The vertical system of an EPSG code, or the vertical axis of a three-dimensional one.
-pub(in crate::height) fn vertical(code: u32) -> Option<Crs> {
+pub(in crate::internal::height) fn vertical(code: u32) -> Option<Crs> {
     let by_own_code = proj_core::lookup_vertical_epsg(code);
     let by_axis = || proj_core::lookup_epsg(code)?.vertical_crs().cloned();
     let system = by_own_code.or_else(by_axis)?;
@@ -80,7 +80,7 @@ fn registered(definition: &CrsDef) -> Option<Crs> {
 }
 
 /// The system that a text describes: well-known text, codes as in `EPSG:2263+6360`, or lines of ARC/INFO.
-pub(in crate::height) fn from_text(text: &str) -> Option<Crs> {
+pub(in crate::internal::height) fn from_text(text: &str) -> Option<Crs> {
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0' || c == '\u{feff}');
     wkt::parse(text).or_else(|| from_codes(text)).or_else(|| from_arc_info(text))
 }
@@ -119,7 +119,7 @@ fn from_arc_info(text: &str) -> Option<Crs> {
 }
 
 /// Returns true for the name or the code of web Mercator.
-pub(in crate::height) fn is_web_mercator(text: &str) -> bool {
+pub(in crate::internal::height) fn is_web_mercator(text: &str) -> bool {
     let squeezed: String = text.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_uppercase();
     let names = ["PSEUDOMERCATOR", "WEBMERCATOR", "MERCATORAUXILIARYSPHERE"];
     let codes = WEB_MERCATOR.map(|code| code.to_string());

@@ -17,7 +17,7 @@ const LOCAL: [&str; 4] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "ENGINEERCRS"]
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// Reads a system, or a horizontal and a vertical system one after the other as ESRI writes them.
-pub(in crate::height) fn parse(text: &str) -> Option<Crs> {
+pub(in crate::internal::height) fn parse(text: &str) -> Option<Crs> {
     if !text.contains('[') || depth(text) > MAX_DEPTH {
         return None;
     }

@@ -45,18 +45,26 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Checks cases on all cores. Returns the failures in order, the first few of them shrunk.
+/// Checks cases of built-in techniques on all cores. Returns the failures in order, the first few of them shrunk.
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
-    let mut failures: Vec<Failure> = cases.filter_map(|case| case.check().err()).map(|failure| *failure).collect();
+    run_with(cases, SweepCase::check)
+}
+
+fn run_with(
+    cases: impl ParallelIterator<Item = SweepCase>,
+    check: impl Fn(&SweepCase) -> Result<(), Box<Failure>> + Sync,
+) -> Vec<Failure> {
+    let mut failures: Vec<Failure> = cases.filter_map(|case| check(&case).err()).map(|failure| *failure).collect();
     let few = failures.len().min(MAX_SHRUNK);
-    failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone(), SweepCase::check));
+    failures[..few].par_iter_mut().for_each(|failure| *failure = shrink::shrink(failure.clone(), &check));
     failures
 }
 
 /// Checks random cases of one technique and variant.
 fn of_config(config: &TechniqueConfig) -> Vec<Finding> {
     let case = |number| random::case(SUITE_SEED, number, config.entry, Some(config.variant));
-    let failures = run((0..SUITE_CASES).into_par_iter().map(case));
+    let check = |case: &SweepCase| case.check_with(config.entry);
+    let failures = run_with((0..SUITE_CASES).into_par_iter().map(case), check);
     let first = failures.first();
     let count = Finding::within("cases that fail", failures.len() as f64, 0.0);
     vec![

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cuesta::height::{self, Field, Loaded, Options};
+use cuesta::internal::height::{self, Field, Loaded, Options};
 
 fn load(file: &str) -> Option<Loaded> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/reports");

@@ -1,6 +1,6 @@
 //! Small files that went wrong for other people (`shared/data/reports`), against what GDAL reads from them.
 
-use cuesta::height::{self, Loaded, Options};
+use cuesta::internal::height::{self, Loaded, Options};
 
 use crate::height::real::shared;
 

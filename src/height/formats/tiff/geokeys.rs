@@ -24,7 +24,7 @@ const VERTICAL_UNITS: u16 = 4099;
 const USER_DEFINED: u16 = 32767;
 
 /// Reads position and system; absent and broken tags are ignored.
-pub(in crate::height::formats) fn read<R: Read + Seek>(
+pub(in crate::internal::height::formats) fn read<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     warnings: &mut Vec<String>,
 ) -> (Option<Affine>, Option<Crs>) {

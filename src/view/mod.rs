@@ -1,8 +1,12 @@
-//! Where the eye is, how it projects, what it can see, and what error it tolerates.
+//! A view: eye, projection, frustum and tolerance.
 //!
 //! World axes: right-handed, x east, y up, z south, metres in f64. Screen: pixels, x right, y down.
 
+mod builder;
+
 use glam::{DMat3, DMat4, DVec2, DVec3};
+
+pub use builder::ViewBuilder;
 
 /// An axis-aligned box in world metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,18 +18,18 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// Euclidean distance from `point` to the closest point of the box, 0 inside.
+    /// Returns the distance from `point` to the closest point of the box, metres; 0 inside.
     pub fn distance(&self, point: DVec3) -> f64 {
         (self.min - point).max(point - self.max).max(DVec3::ZERO).length()
     }
 
-    /// Largest horizontal distance from `point` to a point of the box.
+    /// Returns the largest horizontal distance from `point` to a point of the box, metres.
     pub fn farthest_horizontal(&self, point: DVec3) -> f64 {
         let far = (self.min - point).abs().max((self.max - point).abs());
         far.x.hypot(far.z)
     }
 
-    /// The least and the largest distance of its points from a place in plan (x, z).
+    /// Returns the smallest and the largest horizontal distance of the box from a place in plan (x, z), metres.
     fn distances_in_plan(&self, [x, z]: [f64; 2]) -> (f64, f64) {
         let (min, max) = ([self.min.x - x, self.min.z - z], [self.max.x - x, self.max.z - z]);
         let min = [0, 1].map(|k| min[k].max(-max[k]).max(0.0));
@@ -33,21 +37,21 @@ impl Aabb {
         (min[0].hypot(min[1]), max[0].hypot(max[1]))
     }
 
-    /// Largest value of `normal · p` over the box.
+    /// Returns the largest value of `normal · p` over the box.
     pub fn support(&self, normal: DVec3) -> f64 {
         (normal * self.min).max(normal * self.max).element_sum()
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box around both.
     pub fn union(&self, other: &Aabb) -> Aabb {
         Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 }
 
-/// How eye space becomes a picture.
+/// The projection from eye space to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
-    /// A pinhole with this horizontal field of view, radians, and no far plane.
+    /// A pinhole camera without a far plane.
     Perspective {
         /// Horizontal field of view, radians.
         fov_x: f64,
@@ -61,33 +65,35 @@ pub enum Lens {
     },
 }
 
-/// How a vertical error in metres is turned into pixels.
+/// The formula that converts a vertical error in metres to pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Metric {
-    /// A true upper bound for every pixel of the picture, off the view axis too.
+    /// An upper bound for every pixel of the picture, off the view axis too.
     #[default]
     Certified,
     /// Judnich & Ling 2012, eq. 1: ρ = ε/d · w / (2 tan(φ/2)); no bound off the view axis.
     Paper,
 }
 
-/// The error allowed on the screen.
+/// The largest error allowed on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Pixels.
     pub px: f64,
-    /// What the pixels mean.
+    /// Converts metres to these pixels.
     pub metric: Metric,
 }
 
-/// Returns the near plane of a view for which none is given, metres: a thousandth of the height above ground, at least
-/// 0.1 m, or a two-hundredth of the terrain's diagonal if that is less.
+/// Returns a near plane, metres: a thousandth of the height above ground, and at least 0.1 m. On a terrain with a
+/// diagonal below 20 m the least is a two-hundredth of the diagonal.
 pub fn default_near(above_ground_m: f64, diagonal_m: f64) -> f64 {
     (above_ground_m.abs() / 1000.0).max((diagonal_m / 200.0).min(0.1))
 }
 
-/// One view of the world: everything a technique may base its choice on.
-#[derive(Clone, Copy, Debug)]
+/// One view of the world: all that a technique selects by.
+///
+/// [`View::builder`] makes one.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Position of the eye, world metres.
     pub eye: DVec3,
@@ -95,37 +101,38 @@ pub struct View {
     pub world_from_eye: DMat3,
     /// Projection.
     pub lens: Lens,
-    /// Pixels (x, y).
+    /// Size of the picture (x, y), pixels.
     pub size: [u32; 2],
-    /// Near plane, metres.
+    /// Near plane, metres in front of the eye.
     pub near: f64,
-    /// Error allowed.
+    /// Largest error allowed.
     pub tolerance: Tolerance,
-    /// Time of the scene, seconds: for what goes on gradually. It may stand still, leap or go back.
+    /// Time of the scene, seconds, for gradual transitions. It may stand still, leap or go back.
     pub time_s: f64,
 }
 
-/// How a box lies to the frustum.
+/// The position of a box relative to the frustum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Containment {
-    /// No point of it can be seen.
+    /// No point of the box is in view.
     Outside,
-    /// Some may be seen.
+    /// Some points may be in view.
     Crossing,
-    /// All of it is in the frustum.
+    /// All of the box is in the frustum.
     Inside,
 }
 
-/// Planes around what can be seen: `normal · p ≥ offset` inside.
+/// Planes around the visible part of the world: `normal · p ≥ offset` inside.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     planes: [(DVec3, f64); 5],
-    /// A place in plan (x, z), and how far away from it what can be seen ends, metres.
+    /// A place in plan (x, z), and the draw distance around it, metres.
     reach: Option<([f64; 2], f64)>,
 }
 
 impl Frustum {
-    /// Tests a box against the planes; may say `Crossing` for a box just outside, never the reverse.
+    /// Tests a box against the planes. Conservative: a box just outside may be `Crossing`, a visible one is never
+    /// `Outside`.
     pub fn contains(&self, bounds: &Aabb) -> Containment {
         let mut containment = Containment::Inside;
         if let Some((eye, reach_m)) = self.reach {
@@ -148,13 +155,13 @@ impl Frustum {
         containment
     }
 
-    /// The part of it no further from a place than so many metres in plan.
+    /// Returns the part of the frustum within a horizontal distance of the eye, metres.
     pub fn within(self, eye: DVec3, reach_m: f64) -> Self {
         Self { reach: reach_m.is_finite().then_some(([eye.x, eye.z], reach_m)), ..self }
     }
 }
 
-/// A point of the world on the screen.
+/// The projection of a world point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
     /// Pixels from the top left corner.
@@ -164,7 +171,12 @@ pub struct Projected {
 }
 
 impl View {
-    /// The rotation of an eye that looks along `forward` with the horizon level.
+    /// Returns a builder with default values.
+    pub fn builder() -> ViewBuilder {
+        ViewBuilder::default()
+    }
+
+    /// Returns the rotation of an eye that looks along `forward` with the horizon level.
     pub fn looking_along(forward: DVec3) -> DMat3 {
         let back = -forward.try_normalize().unwrap_or(DVec3::NEG_Z);
         // Straight up or down: north is up on the screen (or down, looking up).
@@ -172,7 +184,7 @@ impl View {
         DMat3::from_cols(right, back.cross(right), back)
     }
 
-    /// The rotation for yaw (0 = east, 90 = south), pitch (up positive) and roll (clockwise), degrees.
+    /// Returns the rotation for yaw (0 = east, 90 = south), pitch (up positive) and roll (clockwise), degrees.
     pub fn turned(yaw: f64, pitch: f64, roll: f64) -> DMat3 {
         let (sin_yaw, cos_yaw) = yaw.to_radians().sin_cos();
         let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
@@ -181,17 +193,17 @@ impl View {
         DMat3::from_cols(right, back.cross(right), back) * Self::rolled(roll)
     }
 
-    /// A roll of the eye about its axis, clockwise, degrees.
+    /// Returns the rotation for a clockwise roll about the view axis, degrees.
     pub fn rolled(roll: f64) -> DMat3 {
         DMat3::from_rotation_z(-roll.to_radians())
     }
 
-    /// Unit vector the eye looks along.
+    /// Returns the unit vector along the view axis.
     pub fn forward(&self) -> DVec3 {
         -self.world_from_eye.z_axis
     }
 
-    /// Pixels per unit of slope (perspective) or per metre (orthographic).
+    /// Returns the focal length in pixels: pixels per unit of slope (perspective) or per metre (orthographic).
     pub fn focal_px(&self) -> f64 {
         let width = f64::from(self.size[0]);
         match self.lens {
@@ -200,8 +212,8 @@ impl View {
         }
     }
 
-    /// From eye-relative world metres to clip space: y down, depth reversed (1 at the near plane, 0 at the
-    /// far one or at infinity).
+    /// Returns the matrix from eye-relative world metres to clip space: y down, depth reversed (1 at the near plane,
+    /// 0 at the far plane or at infinity).
     pub fn clip_from_relative(&self) -> DMat4 {
         let x = 2.0 * self.focal_px() / f64::from(self.size[0]);
         let y = -2.0 * self.focal_px() / f64::from(self.size[1]);
@@ -235,7 +247,7 @@ impl View {
         lens * eye
     }
 
-    /// Where a world point falls on the screen; `None` at or behind the near plane.
+    /// Projects a world point; `None` in front of the near plane or behind the eye.
     pub fn project(&self, point: DVec3) -> Option<Projected> {
         let p = self.world_from_eye.transpose() * (point - self.eye);
         let depth = -p.z;
@@ -250,13 +262,13 @@ impl View {
         Some(Projected { pixel: centre + DVec2::new(p.x, -p.y) * scale, depth })
     }
 
-    /// The same view under a tolerance of `scale` times as many pixels.
+    /// Returns the same view with the tolerance multiplied by `scale`.
     pub fn under_wider_tolerance(&self, scale: f64) -> Self {
         let px = self.tolerance.px.max(f64::MIN_POSITIVE) * scale;
         Self { tolerance: Tolerance { px, ..self.tolerance }, ..*self }
     }
 
-    /// The same picture with so many pixels more on every side.
+    /// Returns the same view with a margin of `px` pixels added on every side.
     pub fn with_margin(&self, px: u32) -> Self {
         let size = self.size.map(|side| side + 2 * px);
         let wider = f64::from(size[0]) / f64::from(self.size[0]);
@@ -267,18 +279,18 @@ impl View {
         Self { lens, size, ..*self }
     }
 
-    /// Whether a projected point lies in the picture.
+    /// Returns true if a projected point lies in the picture.
     pub fn in_picture(&self, at: &Projected) -> bool {
         let size = DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
         at.pixel.cmpge(DVec2::ZERO).all() && at.pixel.cmple(size).all()
     }
 
-    /// Half the picture's width and height, as slopes (perspective) or metres (orthographic).
+    /// Returns half the picture's width and height, as slopes (perspective) or metres (orthographic).
     fn half_extent(&self) -> DVec2 {
         DVec2::new(f64::from(self.size[0]), f64::from(self.size[1])) / (2.0 * self.focal_px())
     }
 
-    /// The planes around what can be seen, without a far plane: `normal · (p − eye) + distance ≥ 0` inside.
+    /// Returns the near plane and the four side planes: `normal · (p − eye) + distance ≥ 0` inside.
     pub fn planes(&self) -> [(DVec3, f64); 5] {
         let half = self.half_extent();
         let rotate = self.world_from_eye;
@@ -293,30 +305,30 @@ impl View {
         [(self.forward(), -self.near), side(1.0, 0.0), side(-1.0, 0.0), side(0.0, 1.0), side(0.0, -1.0)]
     }
 
-    /// The planes around what can be seen, in the world.
+    /// Returns the view's frustum in world space, without a far plane.
     pub fn frustum(&self) -> Frustum {
         let planes = self.planes().map(|(normal, distance)| (normal, normal.dot(self.eye) - distance));
         Frustum { planes, reach: None }
     }
 
-    /// Length of the ray through a picture corner at unit depth.
+    /// Returns the length of the ray through a picture corner at unit depth.
     pub fn corner_ray(&self) -> f64 {
         self.half_extent().length().hypot(1.0)
     }
 
-    /// The largest vertical displacement, metres, that a surface inside `bounds` may have under the
-    /// tolerance and metric of this view: see [`Allowance::error`].
+    /// Returns the largest vertical displacement, metres, that keeps the view's tolerance for a surface inside `bounds`:
+    /// see [`Allowance::error`].
     pub fn allowed_error(&self, bounds: &Aabb) -> f64 {
         self.allowance().error(bounds)
     }
 
-    /// What [`View::allowed_error`] is worked out with, for many boxes.
+    /// Prepares [`View::allowed_error`] for many boxes.
     pub fn allowance(&self) -> Allowance {
         Allowance { view: *self, forward: self.forward(), focal_px: self.focal_px(), corner: self.corner_ray() }
     }
 
-    /// How far, in pixels, the surface drawn at `drawn` is from the truth at `truth`; infinite if either
-    /// lies behind the near plane.
+    /// Returns the distance on the screen between a drawn point and its true position, pixels; infinite if either
+    /// lies in front of the near plane or behind the eye.
     pub fn displacement_px(&self, drawn: DVec3, truth: DVec3) -> f64 {
         match (self.project(drawn), self.project(truth)) {
             (Some(a), Some(b)) => a.pixel.distance(b.pixel),
@@ -325,7 +337,7 @@ impl View {
     }
 }
 
-/// A view's tolerance made ready for many boxes.
+/// A view's tolerance, prepared for many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance {
     view: View,
@@ -336,16 +348,15 @@ pub struct Allowance {
 }
 
 impl Allowance {
-    /// The largest vertical displacement, metres, that a surface inside `bounds` may have under the
-    /// tolerance and metric of this view.
+    /// Returns the largest vertical displacement, metres, that keeps the tolerance for a surface inside `bounds`.
     ///
-    /// Certified: a point at view depth `z` and horizontal distance `r` from the eye, displaced vertically
-    /// by δ, moves on the screen by exactly `f·δ·|…|/(z·z′)` with `|…| ≤ r` and `z′ ≥ z − δ·|u|`, where `u`
-    /// is the component of the world's up vector along the view axis. Visible points of the box have
-    /// `z ≥ max(near, nearest depth, d/k)` and `r ≤ min(k·z, farthest horizontal distance)`, where `k` is
-    /// the length of the ray through a picture corner at unit depth. This tightens and makes safe
-    /// Judnich & Ling's eq. 1, which is up to k² too small off the axis. Under any finite tolerance what is drawn stays in
-    /// front of the eye; under an infinite one everything is allowed.
+    /// Certified metric: a point at view depth `z` and horizontal distance `r` from the eye is displaced vertically by δ.
+    /// It moves on the screen by exactly `f·δ·|…|/(z·z′)` with `|…| ≤ r` and `z′ ≥ z − δ·|u|`. `u` is the component of
+    /// the world's up vector along the view axis. Visible points of the box have `z ≥ max(near, nearest depth, d/k)` and
+    /// `r ≤ min(k·z, farthest horizontal distance)`. `k` is the length of the ray through a picture corner at unit depth.
+    ///
+    /// Judnich & Ling's eq. 1 is up to k² too small off the axis; this bound is safe there and tighter on the axis.
+    /// Under a finite tolerance the displaced surface stays in front of the eye. An infinite one allows everything.
     pub fn error(&self, bounds: &Aabb) -> f64 {
         let View { eye, lens, near, tolerance, .. } = self.view;
         let (focal, px, forward) = (self.focal_px, tolerance.px, self.forward);
