@@ -45,7 +45,8 @@ pub use glam;
 pub use internal::{
     draw::DrawList,
     view::{
-        Aabb, Allowance, Containment, Frustum, Lens, Metric, Projected, Tolerance, View, ViewBuilder, default_near,
+        Aabb, Allowance, Containment, Frustum, Lens, Metric, Projected, Tolerance, View, builder::ViewBuilder,
+        default_near,
     },
 };
 

@@ -40,6 +40,13 @@ impl Default for ViewBuilder {
     }
 }
 
+impl View {
+    /// Returns a builder with default values.
+    pub fn builder() -> ViewBuilder {
+        ViewBuilder::default()
+    }
+}
+
 impl ViewBuilder {
     /// Sets the position of the eye, world metres.
     pub fn eye(mut self, eye: DVec3) -> Self {

@@ -2,11 +2,9 @@
 //!
 //! World axes: right-handed, x east, y up, z south, metres in f64. Screen: pixels, x right, y down.
 
-mod builder;
+pub mod builder;
 
 use glam::{DMat3, DMat4, DVec2, DVec3};
-
-pub use builder::ViewBuilder;
 
 /// An axis-aligned box in world metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,11 +169,6 @@ pub struct Projected {
 }
 
 impl View {
-    /// Returns a builder with default values.
-    pub fn builder() -> ViewBuilder {
-        ViewBuilder::default()
-    }
-
     /// Returns the rotation of an eye that looks along `forward` with the horizon level.
     pub fn looking_along(forward: DVec3) -> DMat3 {
         let back = -forward.try_normalize().unwrap_or(DVec3::NEG_Z);

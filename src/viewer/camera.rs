@@ -45,7 +45,7 @@ pub enum Mode {
 pub struct Motion {
     /// Right, up, forward; −1 to 1 each.
     pub drive: DVec3,
-    /// True to move at [`FAST`] times the speed.
+    /// True to move at `FAST` times the speed.
     pub fast: bool,
     /// Turn to the right and down, degrees.
     pub turn: DVec2,

@@ -1,7 +1,7 @@
 //! Passes of a frame: one row each in [`PASSES`], in the order in which a frame records them.
 //!
 //! A pass is a file here, its shaders, and a row. The name in the row is the debug label, the profiler scope and the
-//! name in every table. From what a row reads and writes, [`PassList`](super::pass_list::PassList) derives where
+//! name in every table. From what a row reads and writes, `PassList` derives where
 //! rendering begins and ends, the barriers between passes, and the images that post-processing reads.
 
 pub mod capture;
