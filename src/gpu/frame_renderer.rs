@@ -11,13 +11,14 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::device::Gpu;
+use super::formats::{DEPTH, Formats};
 use super::frames::{Frames, Timing};
+use super::pass::{Pass, PassInput};
 use super::pass_list::{PassList, draw_only, scene_formats};
-use super::passes::{Pass, PassInput};
 use super::pipelines::Pipelines;
 use super::probe::{Measured, Piece, Probe};
 use super::slot::Part;
-use super::target::{DEPTH, Formats, Selected, Target};
+use super::target::{Selected, Target};
 use super::terrain::Terrain;
 use crate::draw::layout::Frame;
 use crate::draw::{DepthMode, DeviceGeometry, DrawList, Geometry, Limits};

@@ -9,12 +9,12 @@ use anyhow::Result;
 use ash::vk;
 
 use super::device::Gpu;
+use super::formats::{DEPTH, Formats};
 use super::frames::Recording;
 use super::memory::{Image, ImageInfo, barriers, image_barrier};
-use super::passes::{MakeInput, Origin, PASSES, Pass, PassInput, Resource, Row};
-use super::target::{
-    self, Attachments, COLOUR_SAMPLED, COLOUR_WRITTEN, DEPTH, DEPTH_SAMPLED, DEPTH_WRITTEN, Depth, Formats,
-};
+use super::pass::{MakeInput, Origin, Pass, PassInput, Resource, Row};
+use super::passes::PASSES;
+use super::target::{self, Attachments, COLOUR_SAMPLED, COLOUR_WRITTEN, DEPTH_SAMPLED, DEPTH_WRITTEN, Depth};
 use super::terrain::Terrain;
 use crate::plan::ScenePlan;
 

@@ -8,13 +8,15 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
+use super::formats::Formats;
 use super::live;
 use super::shaders::{self, Constants};
-use super::target::Formats;
-use super::terrain::IMAGES;
 use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 use crate::draw::{Normals, Source, Topology};
 use crate::plan::ScenePlan;
+
+/// Number of sampled images of a scene.
+pub(super) const IMAGES: usize = 5;
 
 /// The pipelines of a scene and their common layout.
 pub struct Pipelines {

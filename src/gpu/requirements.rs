@@ -4,8 +4,8 @@ use std::fmt;
 
 use ash::vk;
 
+use super::formats::Formats;
 use super::instance::version_text;
-use super::target::Formats;
 
 /// Vulkan version, device features and formats that drawing terrain needs.
 ///

@@ -8,15 +8,15 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
+use super::formats::Formats;
 use super::frames::Recording;
 use super::gpu_selection::GpuSelector;
 use super::gpu_tile_cache::Overlay;
 use super::height_pages::{self, Sampler, Sampling};
 use super::materials;
 use super::memory::{Buffer, Image, filled, memory_barrier};
-use super::pipelines::Pipelines;
+use super::pipelines::{IMAGES, Pipelines};
 use super::slot::{COMMAND, Part, Slot};
-use super::target::Formats;
 use crate::draw::layout::{ExplicitVertex, Frame, VertexNormals};
 use crate::draw::{
     DeviceGeometry, Draw, DrawList, Geometry, GpuSelection, Limits, Source, Submission, Topology, Upload,
@@ -46,9 +46,6 @@ struct Resident {
     normals: Buffer,
     indices: Buffer,
 }
-
-/// Number of sampled images of a scene.
-pub(super) const IMAGES: usize = 5;
 
 impl Terrain {
     /// Makes the resources of a scene for a technique with this geometry, drawn to these formats.

@@ -18,7 +18,7 @@ use crate::gpu::Gpu;
 use crate::gpu::frame_renderer::{FrameInput, FrameRenderer, HostSteps, SameList};
 use crate::gpu::frames::Timing;
 use crate::gpu::gpu_tile_cache::VirtualTextureStats;
-use crate::gpu::passes::Pass;
+use crate::gpu::pass::Pass;
 use crate::gpu::passes::capture::Capture;
 use crate::gpu::passes::shading_only::ShadingOnly;
 use crate::gpu::target::{Copies, Offscreen};
