@@ -9,8 +9,12 @@ use super::device::Gpu;
 use super::embedded_target::Target;
 use super::frames::Recording;
 use super::lent::DeviceHandles;
+use super::pass::PassInput;
+use super::pass_list::PassList;
+use super::passes;
 use super::requirements::Requirements;
-use super::terrain::Terrain;
+use super::slot::Part;
+use super::terrain::{SceneInput, Terrain};
 use crate::draw::{DepthMode, DeviceGeometry, DrawList, PipelineRequirements};
 use crate::height::Field;
 use crate::plan::{Look, ScenePlan};
@@ -50,6 +54,7 @@ pub struct EmbeddedDescription<'a, L> {
 /// them: the caller first waits until the device has finished all command buffers that draw terrain.
 pub struct EmbeddedTerrain<L> {
     terrain: Terrain,
+    passes: PassList,
     technique: L,
     field: Arc<Field>,
     look: Look,
@@ -88,15 +93,20 @@ impl<L: ListSource> EmbeddedTerrain<L> {
         let requirements = Self::requirements(&target, &look);
         // SAFETY: the caller vouches for the handles.
         let gpu = unsafe { Gpu::lent(handles, &requirements, frames_in_flight)? };
-        let plan = plan(&gpu, &field, &look, technique.pipeline_requirements(), overlay)?;
+        ensure!(overlay.is_some() || !look.colour.shows_overlay(), "the look shows an overlay, and there is none");
+        let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
+        let plan = ScenePlan::builder(&field, &look, &limits).overlay(picture).unmeasured();
+        let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
         ensure!(
             target.depth.is_some() || plan.requirements.depth_mode == DepthMode::Painter,
             "the technique draws in any order: it needs a depth attachment"
         );
-        let terrain = Terrain::new(&gpu, &plan, &field, overlay, technique.device_geometry(), target.formats())?;
+        let (scene, formats) = (SceneInput { plan: &plan, field: &field, overlay }, target.formats());
+        let terrain = Terrain::new(&gpu, scene, technique.device_geometry(), formats)?;
+        let passes = PassList::uploads(&gpu, &plan, &terrain, formats)?;
         let (range, list) = (field.range(), DrawList::default());
         let (view, is_uploaded, frame_index) = (None, false, None);
-        Ok(Self { terrain, technique, field, look, target, range, list, view, is_uploaded, frame_index, gpu })
+        Ok(Self { terrain, passes, technique, field, look, target, range, list, view, is_uploaded, frame_index, gpu })
     }
 
     /// Selects the terrain of a view, which [`Self::prepare`] and [`Self::draw`] then use.
@@ -130,13 +140,13 @@ impl<L: ListSource> EmbeddedTerrain<L> {
         let (count, view) = (self.gpu.frames_in_flight, self.view.context("nothing is selected: call update first")?);
         ensure!(frame_index < count, "frame index {frame_index}: expected less than frames_in_flight, {count}");
         let mut recording = Recording::of_caller(&self.gpu, commands, frame_index);
-        self.terrain.overlay.look(&recording, &view);
         let mut frame = self.look.after(view.time_s).frame(&self.field, &view, self.range);
         frame.camera.clip_from_relative = self.target.clip_from_relative(&view).as_mat4().to_cols_array_2d();
         if self.is_uploaded {
             self.list.uploads.clear();
         }
-        self.terrain.prepare(&mut recording, &frame, &self.list)?;
+        let input = PassInput { view: &view, uniforms: &frame, list: &self.list, part: Part::whole(), probe: None };
+        self.passes.upload(&mut recording, &mut self.terrain, &input, None)?;
         (self.is_uploaded, self.frame_index) = (true, Some(frame_index));
         Ok(())
     }
@@ -154,7 +164,10 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     /// - It runs after the commands of the last [`Self::prepare`], in the same frame.
     pub unsafe fn draw(&self, commands: vk::CommandBuffer) -> Result<()> {
         let frame_index = self.frame_index.context("nothing is prepared: call prepare first")?;
-        self.terrain.draw(&mut Recording::of_caller(&self.gpu, commands, frame_index), &self.list)
+        Recording::of_caller(&self.gpu, commands, frame_index).scope(passes::terrain::ROW.name, |recording| {
+            self.terrain.draw_part(recording, &self.list, &Part::whole());
+            Ok(())
+        })
     }
 
     /// Returns the height of the terrain at a world position (x, z), metres; `None` outside of it and in holes.
@@ -187,22 +200,4 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     pub(crate) fn pending_textures(&self) -> usize {
         self.terrain.overlay.stats().map_or(0, |stats| stats.pending)
     }
-}
-
-/// Plans what the scene needs on the device.
-fn plan(
-    gpu: &Gpu,
-    field: &Field,
-    look: &Look,
-    requirements: PipelineRequirements,
-    overlay: Option<&image::RgbaImage>,
-) -> Result<ScenePlan> {
-    ensure!(overlay.is_some() || !look.colour.shows_overlay(), "the look shows an overlay, and there is none");
-    let limits = gpu.device_limits();
-    let plan = ScenePlan::builder(field, look, &limits)
-        .overlay(overlay.map(|picture| picture.dimensions().into()))
-        .requirements(requirements)
-        .build()
-        .map_err(anyhow::Error::msg)?;
-    Ok(ScenePlan { measured: false, ..plan })
 }

@@ -61,7 +61,7 @@ pub enum Origin {
         /// Returns true if the plan needs the pass.
         is_needed: fn(&ScenePlan) -> bool,
         /// Makes the pass.
-        make: fn(&MakeInput) -> Result<Box<dyn Pass>>,
+        make: fn(&MakeInput) -> Result<Box<dyn Pass + Send>>,
     },
     /// The caller of a frame brings the pass: a target its overlay, a measurement the one pass of its frame.
     Caller,

@@ -20,7 +20,7 @@ use crate::plan::ScenePlan;
 
 /// The passes of a scene, in the order of the table.
 pub(super) struct PassList {
-    passes: Vec<Box<dyn Pass>>,
+    passes: Vec<Box<dyn Pass + Send>>,
     between: Between,
     formats: Formats,
 }
@@ -60,11 +60,29 @@ impl PassList {
     /// # Errors
     /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: &Terrain, formats: Formats, size: [u32; 2]) -> Result<Self> {
-        let between = Between::new(gpu, plan, formats, size)?;
+        Self::of_rows(|_| true, gpu, plan, scene, formats, Between::new(gpu, plan, formats, size)?)
+    }
+
+    /// Makes the passes that upload, for a caller who draws in a rendering scope of its own.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
+    pub fn uploads(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: &Terrain, formats: Formats) -> Result<Self> {
+        Self::of_rows(Row::uploads, gpu, plan, scene, formats, Between(Vec::new()))
+    }
+
+    fn of_rows(
+        is_made: fn(&Row) -> bool,
+        gpu: &Arc<Gpu>,
+        plan: &ScenePlan,
+        scene: &Terrain,
+        formats: Formats,
+        between: Between,
+    ) -> Result<Self> {
         let (mut passes, mut done) = (Vec::new(), 0);
         for row in PASSES {
             let Origin::Plan { make, .. } = row.origin else { continue };
-            if !row.is_needed(plan) {
+            if !row.is_needed(plan) || !is_made(row) {
                 continue;
             }
             let is_post = row.drawn_colour().is_some();

@@ -12,7 +12,7 @@ pub mod hud;
 mod select;
 pub mod shading_only;
 mod sky;
-mod terrain;
+pub(super) mod terrain;
 mod textures;
 mod upload;
 
