@@ -63,7 +63,7 @@ impl PassList {
         Self::of_rows(|_| true, gpu, plan, scene, formats, Between::new(gpu, plan, formats, size)?)
     }
 
-    /// Makes the passes that upload, for a caller who draws in a rendering scope of its own.
+    /// Makes the passes that upload, for a caller with a rendering scope of its own.
     ///
     /// # Errors
     /// If the device is out of memory.
