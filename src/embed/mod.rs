@@ -18,10 +18,12 @@ pub use crate::gpu::requirements::{Requirements, Unsupported};
 use crate::lod::{Omitted, Technique};
 use crate::view::{Metric, View};
 
-/// Terrain to draw, and where it is drawn. [`Entry::prepare`](crate::lod::Entry::prepare) makes a technique.
+/// Terrain to draw by a technique, and where it is drawn: the fields of [`EmbeddedDescription`].
+///
+/// [`Entry::prepare`](crate::lod::Entry::prepare) makes a technique.
 pub type TerrainDescription<'a> = EmbeddedDescription<'a, Box<dyn Technique>>;
 
-/// Draws terrain into the command buffers of a caller.
+/// Draws the terrain of a technique into the command buffers of a caller: the methods of [`EmbeddedTerrain`], and these.
 pub type TerrainRenderer = EmbeddedTerrain<Box<dyn Technique>>;
 
 /// Size and exactness of the last selection.

@@ -38,7 +38,6 @@ fn every_host_gets_the_same_picture() {
         Options { is_reversed: true, far_m: Some(60_000.0), ..pass(vk::Format::X8_D24_UNORM_PACK32) },
         Options { depth: stencil, ..default() },
         pass(vk::Format::D32_SFLOAT_S8_UINT),
-        Options { lends_allocator: false, ..default() },
     ];
     on_device(|_| {
         for options in cases {
