@@ -1,4 +1,5 @@
-//! Compiles the GLSL of `shaders/` to SPIR-V 1.6 for Vulkan 1.3 (feature `vulkan`), and records the commit.
+//! Compiles the GLSL of `shaders/`, and of the example `embed`, to SPIR-V 1.6 for Vulkan 1.3 (feature `vulkan`). Records the
+//! commit.
 
 #[cfg(feature = "vulkan")]
 #[path = "src/draw"]
@@ -75,36 +76,46 @@ mod shaders {
         for source in ["draw/shared", "draw/layout", "lod/clusters/layout", "plan/colour", "plan/constants"] {
             println!("cargo:rerun-if-changed=src/{source}.rs");
         }
-        let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
         let compiler = Compiler::new().expect("shaderc starts");
-        let mut table = String::from("&[\n");
-        let mut failed = false;
-        let mut sources: Vec<_> = std::fs::read_dir("shaders").expect("shaders/").map(|e| e.unwrap().path()).collect();
+        let table = compile_folder(&compiler, Path::new("shaders"));
+        // This example includes its modules by itself.
+        let example = Path::new("examples/embed");
+        let has_failed = table.is_none() || example.is_dir() && compile_folder(&compiler, example).is_none();
+        write_table(&format!("&[\n{}", table.unwrap_or_default()));
+        if has_failed {
+            std::process::exit(1);
+        }
+    }
+
+    /// Compiles the shaders of a folder to modules in `OUT_DIR`. Returns their rows of the table; `None` if any fails.
+    fn compile_folder(compiler: &Compiler, folder: &Path) -> Option<String> {
+        let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
+        let mut rows = Some(String::new());
+        let mut sources: Vec<_> = std::fs::read_dir(folder).expect("a folder").map(|e| e.unwrap().path()).collect();
         sources.sort();
         for path in sources {
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
             let Some((_, kind)) = STAGES.iter().find(|(name, _)| *name == extension) else { continue };
+            println!("cargo:rerun-if-changed={}", path.display());
             let name = path.file_name().expect("a file").to_str().expect("UTF-8").to_string();
             let variants = VARIANTS.iter().filter(|(source, ..)| *source == name);
             let variants = variants.map(|(_, define, variant)| (Some(*define), variant.to_string()));
             for (define, name) in std::iter::once((None, name.clone())).chain(variants) {
-                match compile(&compiler, &path, *kind, define) {
+                match compile(compiler, &path, *kind, define) {
                     Ok(words) => {
                         let spirv = out.join(format!("{name}.spv"));
                         std::fs::write(&spirv, words).expect("OUT_DIR is writable");
-                        table += &format!("    ({name:?}, include_bytes!({:?})),\n", spirv.to_str().expect("UTF-8"));
+                        let row = format!("    ({name:?}, include_bytes!({:?})),\n", spirv.to_str().expect("UTF-8"));
+                        rows = rows.map(|rows| rows + &row);
                     }
                     Err(message) => {
-                        failed = true;
+                        rows = None;
                         message.lines().for_each(|line| println!("cargo::error={line}"));
                     }
                 }
             }
         }
-        write_table(&table);
-        if failed {
-            std::process::exit(1);
-        }
+        rows
     }
 
     /// Closes the table of shaders and writes it where `src/gpu/shaders.rs` includes it.

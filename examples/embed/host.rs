@@ -31,6 +31,7 @@ pub struct Attachment {
     pub image: vk::Image,
     pub view: vk::ImageView,
     pub format: vk::Format,
+    pub samples: vk::SampleCountFlags,
     memory: Allocation,
 }
 
@@ -63,8 +64,8 @@ impl Host {
         Ok(Self { entry, instance, physical_device, device, queue, queue_family, allocator, messenger, messages })
     }
 
-    /// Lends the handles to the terrain renderer.
-    pub fn handles(&self) -> DeviceHandles {
+    /// Lends the handles to the terrain renderer, with the allocator or without.
+    pub fn handles(&self, lends_allocator: bool) -> DeviceHandles {
         DeviceHandles {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
@@ -72,20 +73,31 @@ impl Host {
             device: self.device.clone(),
             queue: self.queue,
             queue_family: self.queue_family,
-            allocator: Some(Arc::clone(&self.allocator)),
+            allocator: lends_allocator.then(|| Arc::clone(&self.allocator)),
             debug_utils: self.messenger.is_some(),
         }
     }
 
+    /// Bytes of all live allocations of the allocator.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.allocator.lock().expect("no thread panicked").generate_report().total_allocated_bytes
+    }
+
     /// Creates an attachment.
-    pub fn attachment(&self, size: [u32; 2], format: vk::Format, usage: vk::ImageUsageFlags) -> Result<Attachment> {
+    pub fn attachment(
+        &self,
+        size: [u32; 2],
+        format: vk::Format,
+        samples: vk::SampleCountFlags,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<Attachment> {
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
             .extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 })
             .mip_levels(1)
             .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
+            .samples(samples)
             .usage(usage);
         // SAFETY: the device is alive; memory is bound before the view is created.
         unsafe {
@@ -97,9 +109,9 @@ impl Host {
                 .image(image)
                 .view_type(vk::ImageViewType::TYPE_2D)
                 .format(format)
-                .subresource_range(range(usage));
+                .subresource_range(range(format));
             let view = self.device.create_image_view(&info, None)?;
-            Ok(Attachment { image, view, format, memory })
+            Ok(Attachment { image, view, format, samples, memory })
         }
     }
 
@@ -170,11 +182,21 @@ impl Readback {
     }
 }
 
-/// The whole of an attachment.
-pub fn range(usage: vk::ImageUsageFlags) -> vk::ImageSubresourceRange {
-    let is_depth = usage.contains(vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT);
-    let aspect = if is_depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+/// The whole of an image.
+pub fn range(format: vk::Format) -> vk::ImageSubresourceRange {
+    use vk::ImageAspectFlags as Aspect;
+    let aspect = match format {
+        vk::Format::D16_UNORM | vk::Format::X8_D24_UNORM_PACK32 | vk::Format::D32_SFLOAT => Aspect::DEPTH,
+        _ if has_stencil(format) => Aspect::DEPTH | Aspect::STENCIL,
+        _ => Aspect::COLOR,
+    };
     vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1)
+}
+
+/// Returns true if a depth format has stencil values, too.
+pub fn has_stencil(format: vk::Format) -> bool {
+    use vk::Format as F;
+    [F::D16_UNORM_S8_UINT, F::D24_UNORM_S8_UINT, F::D32_SFLOAT_S8_UINT].contains(&format)
 }
 
 type Messenger = (ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT);

@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use ash::{ext, vk};
+use ash::vk;
 
 use super::device::Gpu;
-use super::instance::Instance;
 
 /// Number of simultaneous readings of both clocks; the one with the smallest deviation is used.
 const READINGS: usize = 8;
@@ -35,20 +34,6 @@ struct Unit {
     us: f64,
     /// Valid bits of a timestamp.
     bits: u32,
-}
-
-/// Returns true if the driver has `VK_EXT_calibrated_timestamps` and supports the device time domain with it.
-pub(super) fn is_readable(instance: &Instance, device: vk::PhysicalDevice) -> bool {
-    // SAFETY: the device is of this instance.
-    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(device) }.unwrap_or_default();
-    let name = Ok(ext::calibrated_timestamps::NAME);
-    if !extensions.iter().any(|extension| extension.extension_name_as_c_str() == name) {
-        return false;
-    }
-    let calibrated = ext::calibrated_timestamps::Instance::new(&instance.entry, &instance.raw);
-    // SAFETY: the device is of this instance and has the extension.
-    let domains = unsafe { calibrated.get_physical_device_calibrateable_time_domains(device) }.unwrap_or_default();
-    domains.contains(&vk::TimeDomainEXT::DEVICE)
 }
 
 impl Clock {

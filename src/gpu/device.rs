@@ -2,19 +2,19 @@
 
 use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use anyhow::{Context, Result, bail};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-use super::clock;
-use super::frames::SLOTS;
 use super::instance::{Instance, version_text};
-use super::loss::Presence;
 use super::requirements::Requirements;
 use crate::plan::DeviceLimits;
+
+/// Frames in flight on a device of this crate: the host records one while the device draws the other.
+pub const FRAMES_IN_FLIGHT: usize = 2;
 
 /// Choice of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -86,6 +86,19 @@ pub struct Gpu {
     /// Number of allocations that succeed before one fails.
     allocations_left: AtomicU64,
     pub(super) presence: Presence,
+}
+
+/// State of a device that may be lost.
+pub(super) struct Presence {
+    /// Number of calls that succeed before a simulated loss.
+    pub calls_left: AtomicU64,
+    pub is_lost: AtomicBool,
+}
+
+impl Default for Presence {
+    fn default() -> Self {
+        Self { calls_left: AtomicU64::new(u64::MAX), is_lost: AtomicBool::new(false) }
+    }
 }
 
 /// Device and queue, with the allocator of the device's memory.
@@ -175,6 +188,20 @@ fn counts_draws(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
     v12.draw_indirect_count == vk::TRUE
 }
 
+/// Returns true if the driver has `VK_EXT_calibrated_timestamps` and supports the device time domain with it.
+fn reads_clock(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
+    // SAFETY: the device is of this instance.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(raw) }.unwrap_or_default();
+    let name = Ok(ext::calibrated_timestamps::NAME);
+    if !extensions.iter().any(|extension| extension.extension_name_as_c_str() == name) {
+        return false;
+    }
+    let calibrated = ext::calibrated_timestamps::Instance::new(&instance.entry, &instance.raw);
+    // SAFETY: the device is of this instance and has the extension.
+    let domains = unsafe { calibrated.get_physical_device_calibrateable_time_domains(raw) }.unwrap_or_default();
+    domains.contains(&vk::TimeDomainEXT::DEVICE)
+}
+
 impl Candidate {
     /// Returns true if the device computes on the CPU.
     pub fn is_software(&self) -> bool {
@@ -217,7 +244,7 @@ impl Gpu {
             counts_passed: available.occlusion_query_precise == vk::TRUE,
             captures: available.vertex_pipeline_stores_and_atomics == vk::TRUE,
             counts_draws: counts_draws(instance, candidate.raw),
-            clock: clock::is_readable(instance, candidate.raw),
+            clock: reads_clock(instance, candidate.raw),
             timestamps: true,
         };
         let mut core = vk::PhysicalDeviceFeatures::default()
@@ -242,7 +269,7 @@ impl Gpu {
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
         let allocator = allocator(&instance.raw, &raw, candidate.raw)?;
         let handles = Handles { raw, queue, allocator, is_lent: false };
-        let gpu = Self::assemble(Arc::clone(instance), candidate, handles, optional, SLOTS);
+        let gpu = Self::assemble(Arc::clone(instance), candidate, handles, optional, FRAMES_IN_FLIGHT);
         gpu.name(queue, "queue");
         Ok(gpu)
     }

@@ -11,17 +11,17 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::device::Gpu;
+use super::formats::{DEPTH, Formats};
 use super::frames::{Frames, Timing};
+use super::pass::{Pass, PassInput};
 use super::pass_list::{PassList, draw_only, scene_formats};
-use super::passes::{Pass, PassInput};
 use super::pipelines::Pipelines;
 use super::probe::{Measured, Piece, Probe};
 use super::slot::Part;
-use super::target::{DEPTH, Formats, Selected, Target};
-use super::terrain::Terrain;
+use super::target::{Selected, Target};
+use super::terrain::{SceneInput, Terrain};
 use crate::draw::layout::Frame;
 use crate::draw::{DepthMode, DeviceGeometry, DrawList, Geometry, Limits};
-use crate::height::Field;
 use crate::plan::ScenePlan;
 use crate::view::View;
 
@@ -110,33 +110,27 @@ impl FrameRenderer {
     /// If the scene exceeds a limit of the device, or its memory.
     pub fn new(
         gpu: &Arc<Gpu>,
-        plan: &ScenePlan,
-        field: &Arc<Field>,
-        overlay: Option<&image::RgbaImage>,
+        scene: SceneInput,
         geometry: DeviceGeometry,
         formats: Formats,
         size: [u32; 2],
     ) -> Result<Self> {
+        let plan = scene.plan;
         let frames = Frames::new(gpu, plan.measured)?;
-        let terrain = Terrain::new(gpu, plan, field, overlay, geometry, scene_formats(plan, formats))?;
+        let terrain = Terrain::new(gpu, scene, geometry, scene_formats(plan, formats))?;
         let passes = PassList::new(gpu, plan, &terrain, formats, size)?;
         let (plan, gpu) = (plan.clone(), Arc::clone(gpu));
         Ok(Self { frames, terrain, passes, with_depth: None, probe: None, plan, formats, size, gpu })
     }
 
-    /// Changes the look: the plan, and the formats of the target. Waits for the device. `field` and `picture` are those
-    /// that the renderer was made with.
+    /// Changes the look: the plan, and the formats of the target. Waits for the device. Field and picture are those that
+    /// the renderer was made with.
     ///
     /// # Errors
     /// If the device is out of memory.
-    pub fn replan(
-        &mut self,
-        plan: &ScenePlan,
-        field: &Arc<Field>,
-        picture: Option<&image::RgbaImage>,
-        formats: Formats,
-    ) -> Result<()> {
-        self.terrain.replan(plan, field, picture, scene_formats(plan, formats))?;
+    pub fn replan(&mut self, scene: SceneInput, formats: Formats) -> Result<()> {
+        let plan = scene.plan;
+        self.terrain.replan(scene, scene_formats(plan, formats))?;
         (self.plan, self.formats, self.with_depth) = (plan.clone(), formats, None);
         self.passes = PassList::new(&self.gpu, plan, &self.terrain, formats, self.size)?;
         Ok(())

@@ -5,10 +5,8 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use ash::vk;
 
-use super::device::Gpu;
+use super::device::{FRAMES_IN_FLIGHT, Gpu};
 
-/// Frames in flight: the host records one while the device draws the other.
-pub const SLOTS: usize = 2;
 /// Most passes that a frame times.
 const SCOPES: u32 = 16;
 /// Queries of a stamp: see [`stamp`].
@@ -62,7 +60,7 @@ pub struct Recording<'a> {
     pub gpu: &'a Arc<Gpu>,
     /// The command buffer.
     pub commands: vk::CommandBuffer,
-    /// The slot's number, below [`SLOTS`].
+    /// The slot's number, below [`FRAMES_IN_FLIGHT`].
     pub slot: usize,
     /// Queries of the frame; none in a command buffer that another renderer began.
     queries: Option<&'a mut Slot>,
@@ -72,7 +70,7 @@ impl Frames {
     /// Slots with queries if `measured`.
     pub fn new(gpu: &Arc<Gpu>, measured: bool) -> Result<Self> {
         let measured = measured && gpu.timestamp_ns > 0.0;
-        let slots = (0..SLOTS).map(|_| Slot::new(gpu, measured)).collect::<Result<_>>()?;
+        let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, measured)).collect::<Result<_>>()?;
         let timing = Timing::default();
         Ok(Self { gpu: Arc::clone(gpu), slots, next: 0, measured, counts_passed: false, timing })
     }
@@ -137,14 +135,14 @@ impl Frames {
         // SAFETY: the frame before in this slot has ended.
         unsafe { self.gpu.raw.reset_fences(&[slot.fence])? };
         submit(&self.gpu, slot.commands[slot.current], info, slot.fence)?;
-        self.next = (self.next + 1) % SLOTS;
+        self.next = (self.next + 1) % FRAMES_IN_FLIGHT;
         Ok(())
     }
 
     /// Waits for all frames and reads the newest timing.
     pub fn finish(&mut self) -> Result<()> {
-        for k in 0..SLOTS {
-            self.wait((self.next + k) % SLOTS)?;
+        for k in 0..FRAMES_IN_FLIGHT {
+            self.wait((self.next + k) % FRAMES_IN_FLIGHT)?;
         }
         Ok(())
     }

@@ -39,7 +39,7 @@ impl Gpu {
     ///
     /// # Safety
     /// The handles are valid, belong together and outlive the result. The device has the required features enabled.
-    pub(crate) unsafe fn lent(
+    pub(super) unsafe fn lent(
         handles: DeviceHandles,
         requirements: &Requirements,
         frames_in_flight: usize,

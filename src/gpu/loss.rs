@@ -1,26 +1,13 @@
 //! Loss of the device. A driver that resets it or gives up reports the loss at a submission or a wait, and every later call
 //! fails. Tests simulate a loss after a number of calls.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 
 use anyhow::{Result, anyhow};
 use ash::prelude::VkResult;
 use ash::vk;
 
 use super::device::Gpu;
-
-/// State of a device that may be lost.
-pub(super) struct Presence {
-    /// Number of calls that succeed before a simulated loss.
-    calls_left: AtomicU64,
-    is_lost: AtomicBool,
-}
-
-impl Default for Presence {
-    fn default() -> Self {
-        Self { calls_left: AtomicU64::new(u64::MAX), is_lost: AtomicBool::new(false) }
-    }
-}
 
 impl Gpu {
     /// Simulates a loss of the device after the next `calls` submissions and waits.

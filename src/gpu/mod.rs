@@ -1,4 +1,4 @@
-//! Executes draw lists on Vulkan. Besides [`embed`](crate::embed), it is the only module that names `ash` or says `unsafe`.
+//! Executes draw lists on Vulkan. The only module that names `ash` or says `unsafe`.
 //!
 //! It does not depend on any technique. One [`frame_renderer`] draws every frame as a list of [`passes`] to a
 //! [`target`]. All objects are made in advance; nothing is created inside a frame.
@@ -7,6 +7,9 @@
 mod bindings;
 pub mod clock;
 pub mod device;
+pub mod embedded;
+pub mod embedded_target;
+pub mod formats;
 pub mod frame_renderer;
 pub mod frames;
 pub mod gpu_selection;
@@ -18,6 +21,7 @@ mod live;
 mod loss;
 mod materials;
 pub mod memory;
+pub mod pass;
 mod pass_list;
 pub mod passes;
 pub mod pipelines;

@@ -9,18 +9,18 @@ use anyhow::Result;
 use ash::vk;
 
 use super::device::Gpu;
+use super::formats::{DEPTH, Formats};
 use super::frames::Recording;
 use super::memory::{Image, ImageInfo, barriers, image_barrier};
-use super::passes::{MakeInput, Origin, PASSES, Pass, PassInput, Resource, Row};
-use super::target::{
-    self, Attachments, COLOUR_SAMPLED, COLOUR_WRITTEN, DEPTH, DEPTH_SAMPLED, DEPTH_WRITTEN, Depth, Formats,
-};
+use super::pass::{MakeInput, Origin, Pass, PassInput, Resource, Row};
+use super::passes::PASSES;
+use super::target::{self, Attachments, COLOUR_SAMPLED, COLOUR_WRITTEN, DEPTH_SAMPLED, DEPTH_WRITTEN, Depth};
 use super::terrain::Terrain;
 use crate::plan::ScenePlan;
 
 /// The passes of a scene, in the order of the table.
 pub(super) struct PassList {
-    passes: Vec<Box<dyn Pass>>,
+    passes: Vec<Box<dyn Pass + Send>>,
     between: Between,
     formats: Formats,
 }
@@ -60,11 +60,29 @@ impl PassList {
     /// # Errors
     /// If the device is out of memory.
     pub fn new(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: &Terrain, formats: Formats, size: [u32; 2]) -> Result<Self> {
-        let between = Between::new(gpu, plan, formats, size)?;
+        Self::of_rows(|_| true, gpu, plan, scene, formats, Between::new(gpu, plan, formats, size)?)
+    }
+
+    /// Makes the passes that upload, for a caller with a rendering scope of its own.
+    ///
+    /// # Errors
+    /// If the device is out of memory.
+    pub fn uploads(gpu: &Arc<Gpu>, plan: &ScenePlan, scene: &Terrain, formats: Formats) -> Result<Self> {
+        Self::of_rows(Row::uploads, gpu, plan, scene, formats, Between(Vec::new()))
+    }
+
+    fn of_rows(
+        is_made: fn(&Row) -> bool,
+        gpu: &Arc<Gpu>,
+        plan: &ScenePlan,
+        scene: &Terrain,
+        formats: Formats,
+        between: Between,
+    ) -> Result<Self> {
         let (mut passes, mut done) = (Vec::new(), 0);
         for row in PASSES {
             let Origin::Plan { make, .. } = row.origin else { continue };
-            if !row.is_needed(plan) {
+            if !row.is_needed(plan) || !is_made(row) {
                 continue;
             }
             let is_post = row.drawn_colour().is_some();

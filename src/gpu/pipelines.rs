@@ -8,13 +8,15 @@ use anyhow::{Context, Result};
 use ash::vk;
 
 use super::device::Gpu;
+use super::formats::Formats;
 use super::live;
 use super::shaders::{self, Constants};
-use super::target::Formats;
-use super::terrain::IMAGES;
 use crate::draw::layout::{ExplicitVertex, Instance, LatticeVertex, VertexNormals};
 use crate::draw::{Normals, Source, Topology};
 use crate::plan::ScenePlan;
+
+/// Number of sampled images of a scene.
+pub(super) const IMAGES: usize = 5;
 
 /// The pipelines of a scene and their common layout.
 pub struct Pipelines {
@@ -25,8 +27,6 @@ pub struct Pipelines {
     pub layout: vk::PipelineLayout,
     /// Sky behind the terrain; null if the formats have none.
     pub sky: vk::Pipeline,
-    /// True if pictures have a depth buffer.
-    pub has_depth: bool,
     terrain: BTreeMap<(Source, Topology), vk::Pipeline>,
 }
 
@@ -56,8 +56,8 @@ impl Pipelines {
             (set_layout, gpu.raw.create_pipeline_layout(&info, None)?)
         };
         gpu.name(layout, "scene");
-        let (sky, has_depth) = (vk::Pipeline::null(), formats.depth.is_some());
-        let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, has_depth, terrain: BTreeMap::new() };
+        let sky = vk::Pipeline::null();
+        let mut pipelines = Self { gpu: Arc::clone(gpu), set_layout, layout, sky, terrain: BTreeMap::new() };
         if formats.has_sky {
             pipelines.sky = pipelines.make_sky(formats)?;
         }

@@ -4,8 +4,8 @@ use std::fmt;
 
 use ash::vk;
 
+use super::formats::Formats;
 use super::instance::version_text;
-use super::target::Formats;
 
 /// Vulkan version, device features and formats that drawing terrain needs.
 ///
@@ -124,7 +124,7 @@ impl Requirements {
         Self { uses: Uses { wireframe: true, dynamic_rendering: true, timing: true }, formats: None };
 
     /// The requirements for drawing to these formats on a device of a caller.
-    pub(crate) fn for_formats(formats: Formats, wireframe: bool) -> Self {
+    pub(super) fn for_formats(formats: Formats, wireframe: bool) -> Self {
         let dynamic_rendering = formats.render_pass.is_none();
         Self { uses: Uses { wireframe, dynamic_rendering, timing: false }, formats: Some(formats) }
     }

@@ -11,7 +11,7 @@ use super::device::Gpu;
 use super::gpu_tile_cache::GpuTileCache;
 use super::height_pages::Sampler;
 use super::memory::{Buffer, Image};
-use super::terrain::IMAGES;
+use super::pipelines::IMAGES;
 use crate::draw::layout::{ExplicitVertex, Frame, Instance, VertexNormals};
 use crate::draw::{Draw, DrawList, Limits, RESTART};
 

@@ -9,12 +9,13 @@ use anyhow::{Context, Result, bail};
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
-use super::device::{Candidate, Gpu};
-use super::frames::{Recording, SLOTS};
+use super::device::{Candidate, FRAMES_IN_FLIGHT, Gpu};
+use super::formats::{DEPTH, Formats};
+use super::frames::Recording;
 use super::instance::Instance;
 use super::memory::{Image, barriers, image_barrier};
 use super::screenshot::Screenshot;
-use super::target::{Attachment, Attachments, COLOUR_WRITTEN, DEPTH, Depth, Formats, depth_image};
+use super::target::{Attachment, Attachments, COLOUR_WRITTEN, Depth, depth_image};
 
 /// A window of the system.
 pub trait Window: HasWindowHandle + HasDisplayHandle {}
@@ -143,7 +144,7 @@ impl Swapchain {
         let format = preferred(&surface.formats(gpu.candidate.raw)?)?;
         let info = vk::SemaphoreCreateInfo::default();
         // SAFETY: the device is alive; Drop destroys the semaphores.
-        let acquired = (0..SLOTS).map(|_| unsafe { gpu.raw.create_semaphore(&info, None) });
+        let acquired = (0..FRAMES_IN_FLIGHT).map(|_| unsafe { gpu.raw.create_semaphore(&info, None) });
         let acquired = acquired.collect::<Result<Vec<_>, _>>()?;
         acquired.iter().for_each(|semaphore| gpu.name(*semaphore, "image acquired"));
         Ok(Self {

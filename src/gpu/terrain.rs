@@ -8,15 +8,15 @@ use ash::vk;
 use bytemuck::cast_slice;
 
 use super::device::Gpu;
+use super::formats::Formats;
 use super::frames::Recording;
 use super::gpu_selection::GpuSelector;
 use super::gpu_tile_cache::Overlay;
 use super::height_pages::{self, Sampler, Sampling};
 use super::materials;
 use super::memory::{Buffer, Image, filled, memory_barrier};
-use super::pipelines::Pipelines;
+use super::pipelines::{IMAGES, Pipelines};
 use super::slot::{COMMAND, Part, Slot};
-use super::target::Formats;
 use crate::draw::layout::{ExplicitVertex, Frame, VertexNormals};
 use crate::draw::{
     DeviceGeometry, Draw, DrawList, Geometry, GpuSelection, Limits, Source, Submission, Topology, Upload,
@@ -39,6 +39,17 @@ pub struct Terrain {
     gpu_selector: Option<GpuSelector>,
 }
 
+/// A scene to draw: its plan, and the data behind the plan.
+#[derive(Clone, Copy)]
+pub struct SceneInput<'a> {
+    /// Features of its pipelines and resources.
+    pub plan: &'a ScenePlan,
+    /// The heights.
+    pub field: &'a Arc<Field>,
+    /// A picture draped over the field.
+    pub overlay: Option<&'a image::RgbaImage>,
+}
+
 /// Geometry that stays on the device from frame to frame.
 struct Resident {
     lattice: Buffer,
@@ -47,22 +58,13 @@ struct Resident {
     indices: Buffer,
 }
 
-/// Number of sampled images of a scene.
-pub(super) const IMAGES: usize = 5;
-
 impl Terrain {
     /// Makes the resources of a scene for a technique with this geometry, drawn to these formats.
     ///
     /// # Errors
     /// If the scene exceeds a limit of the device, or its memory.
-    pub fn new(
-        gpu: &Arc<Gpu>,
-        plan: &ScenePlan,
-        field: &Arc<Field>,
-        overlay: Option<&image::RgbaImage>,
-        geometry: DeviceGeometry,
-        formats: Formats,
-    ) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, scene: SceneInput, geometry: DeviceGeometry, formats: Formats) -> Result<Self> {
+        let SceneInput { plan, field, overlay } = scene;
         let pipelines = Pipelines::new(gpu, plan, formats)?;
         let images = [
             height_pages::heights(gpu, plan, field)?,
@@ -124,17 +126,11 @@ impl Terrain {
     ///
     /// # Errors
     /// If the device is out of memory.
-    pub fn replan(
-        &mut self,
-        plan: &ScenePlan,
-        field: &Arc<Field>,
-        picture: Option<&image::RgbaImage>,
-        formats: Formats,
-    ) -> Result<()> {
+    pub fn replan(&mut self, SceneInput { plan, field, overlay }: SceneInput, formats: Formats) -> Result<()> {
         self.gpu.wait_idle()?;
         self.pipelines = Pipelines::new(&self.gpu, plan, formats)?;
         if !self.overlay.serves(plan) {
-            self.overlay = Overlay::new(&self.gpu, plan, field, picture)?;
+            self.overlay = Overlay::new(&self.gpu, plan, field, overlay)?;
             self.remake_slots()?;
         }
         Ok(())
@@ -170,24 +166,6 @@ impl Terrain {
     /// The selection on the device, if the technique has one and the device can run it.
     pub fn gpu_selector(&self) -> Option<&GpuSelector> {
         self.gpu_selector.as_ref()
-    }
-
-    /// Writes a frame's data and records its uploads, before rendering begins: for callers with a frame of their own.
-    ///
-    /// # Errors
-    /// If the device fails.
-    ///
-    /// # Panics
-    /// If the list exceeds the limits that its technique stated.
-    pub fn prepare(&mut self, recording: &mut Recording, frame: &Frame, list: &DrawList) -> Result<()> {
-        self.write(recording.slot, frame, list, &Part::whole());
-        if list.uploads.is_empty() {
-            return Ok(());
-        }
-        recording.scope("upload", |r| {
-            self.upload(r, &list.uploads);
-            Ok(())
-        })
     }
 
     /// Writes the data of a part of a frame for the device.
@@ -242,31 +220,6 @@ impl Terrain {
             at += bytes.len();
         }
         memory_barrier(&self.gpu, recording.commands, write, read);
-    }
-
-    /// Records a whole list and the sky within rendering: for callers with a frame of their own.
-    ///
-    /// # Errors
-    /// None at present.
-    pub fn draw(&self, recording: &mut Recording, list: &DrawList) -> Result<()> {
-        let sky = |recording: &mut Recording| {
-            if self.pipelines.sky == vk::Pipeline::null() {
-                return Ok(());
-            }
-            recording.scope("sky", |r| {
-                self.draw_sky(r);
-                Ok(())
-            })
-        };
-        let has_depth = self.pipelines.has_depth;
-        if !has_depth {
-            sky(recording)?;
-        }
-        recording.scope("terrain", |r| {
-            self.draw_part(r, list, &Part::whole());
-            Ok(())
-        })?;
-        if has_depth { sky(recording) } else { Ok(()) }
     }
 
     /// Records the draws of a part of a list.

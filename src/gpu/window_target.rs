@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::frames::{Recording, Semaphores};
-use super::passes::Pass;
+use super::pass::Pass;
 use super::passes::hud::{Hud, Painted};
 use super::screenshot::Screenshot;
 use super::swapchain::{Acquired, Swapchain};

@@ -15,14 +15,15 @@ pub struct ScenePlanBuilder<'a> {
     overlay: Option<[u32; 2]>,
     requirements: PipelineRequirements,
     windowed: bool,
+    measured: bool,
 }
 
 impl ScenePlan {
     /// Starts the plan of a field with a look (which also names the forced features) on a device. By default there is
-    /// no overlay, the technique draws lattice triangles, and pictures stay in memory.
+    /// no overlay, the technique draws lattice triangles, pictures stay in memory, and frames are timed.
     pub fn builder<'a>(field: &'a Field, look: &'a Look, limits: &DeviceLimits) -> ScenePlanBuilder<'a> {
         let requirements = PipelineRequirements::default();
-        ScenePlanBuilder { field, look, limits: *limits, overlay: None, requirements, windowed: false }
+        ScenePlanBuilder { field, look, limits: *limits, overlay: None, requirements, windowed: false, measured: true }
     }
 }
 
@@ -43,12 +44,17 @@ impl ScenePlanBuilder<'_> {
         Self { windowed: true, ..self }
     }
 
+    /// Frames are not timed.
+    pub fn unmeasured(self) -> Self {
+        Self { measured: false, ..self }
+    }
+
     /// Makes the plan.
     ///
     /// # Errors
     /// If the field exceeds a limit of the device, or the look's texture bytes do not hold the smallest working set.
     pub fn build(self) -> Result<ScenePlan, String> {
-        let Self { field, look, limits, overlay, requirements, windowed } = self;
+        let Self { field, look, limits, overlay, requirements, windowed, measured } = self;
         let (stored, is_endless) = (field.stored(), field.procedural().is_some());
         let page_shift = page_shift(stored, &limits);
         let drape = look.drape_over(field);
@@ -73,7 +79,7 @@ impl ScenePlanBuilder<'_> {
             requirements,
             draws: requirements.draws,
             detail: look.detail,
-            measured: true,
+            measured,
             windowed,
             stored,
             overlay,

@@ -18,10 +18,11 @@ use crate::gpu::Gpu;
 use crate::gpu::frame_renderer::{FrameInput, FrameRenderer, HostSteps, SameList};
 use crate::gpu::frames::Timing;
 use crate::gpu::gpu_tile_cache::VirtualTextureStats;
-use crate::gpu::passes::Pass;
+use crate::gpu::pass::Pass;
 use crate::gpu::passes::capture::Capture;
 use crate::gpu::passes::shading_only::ShadingOnly;
 use crate::gpu::target::{Copies, Offscreen};
+use crate::gpu::terrain::SceneInput;
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
@@ -113,9 +114,9 @@ impl<'a> Scene<'a> {
         if self.plan.has_depth() {
             offscreen.add_depth(self.gpu)?;
         }
-        let geometry = technique.device_geometry();
+        let scene = SceneInput { plan: self.plan, field: self.field, overlay: self.overlay };
         Ok(SceneRenderer {
-            renderer: FrameRenderer::new(self.gpu, self.plan, self.field, self.overlay, geometry, formats, size)?,
+            renderer: FrameRenderer::new(self.gpu, scene, technique.device_geometry(), formats, size)?,
             shading_only: None,
             capture: None,
             offscreen,

@@ -10,6 +10,7 @@ use crate::gpu::frame_renderer::{Allowed, DrawSource, FrameInput, FrameRenderer}
 use crate::gpu::passes::hud::{Hud, Painted};
 use crate::gpu::swapchain::{Surface, Swapchain, Window};
 use crate::gpu::target::Selected;
+use crate::gpu::terrain::SceneInput;
 use crate::gpu::window_target::WindowTarget;
 use crate::gpu::{Gpu, Instance};
 use crate::lod::{Entry, Settings, Technique};
@@ -76,6 +77,10 @@ fn plan(gpu: &Gpu, setup: &Setup, look: &Look, technique: &dyn Technique) -> Res
     plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
 }
 
+fn scene<'a>(setup: &'a Setup, plan: &'a ScenePlan) -> SceneInput<'a> {
+    SceneInput { plan, field: &setup.field, overlay: setup.overlay.as_ref() }
+}
+
 impl WindowRenderer {
     /// Makes device, swapchain, HUD and technique for a window.
     ///
@@ -89,9 +94,8 @@ impl WindowRenderer {
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         swapchain.set_depth(plan.has_depth())?;
-        let (picture, geometry) = (setup.overlay.as_ref(), technique.device_geometry());
         let (formats, size) = (swapchain.formats(), setup.view.size);
-        let renderer = FrameRenderer::new(&gpu, &plan, &setup.field, picture, geometry, formats, size)?;
+        let renderer = FrameRenderer::new(&gpu, scene(setup, &plan), technique.device_geometry(), formats, size)?;
         Ok(Self {
             hud: Hud::new(&gpu, renderer.overlay_formats())?,
             renderer,
@@ -117,8 +121,7 @@ impl WindowRenderer {
         let plan = plan(&self.gpu, setup, look, self.technique.as_ref())?;
         let before = self.renderer.overlay_formats();
         self.swapchain.set_depth(plan.has_depth())?;
-        let (formats, picture) = (self.swapchain.formats(), setup.overlay.as_ref());
-        self.renderer.replan(&plan, &setup.field, picture, formats)?;
+        self.renderer.replan(scene(setup, &plan), self.swapchain.formats())?;
         let formats = self.renderer.overlay_formats();
         if formats != before { self.hud.reformat(formats) } else { Ok(()) }
     }

@@ -9,7 +9,6 @@ use super::{collect, paths};
 /// Circles yet to be cut, each by the first of its modules.
 const UNCUT: &[&str] = &[
     "draw",
-    "gpu",
     "height",
     "height::bezier",
     "height::bounds",

@@ -7,51 +7,122 @@ use ash::vk;
 use cuesta::embed::{DepthTarget, Target, TerrainRenderer};
 use cuesta::internal::plan::Look;
 
-use self::example::Options;
-use super::{golden, on_device};
+use self::example::{FRAMES, Options, Outcome};
+use super::{difference, golden, on_device};
 
-/// Draws the example with some options, and compares it with the golden picture.
-fn check(options: Options) {
-    // A device that the other tests can use is one for the example, too.
+/// Draws the example with some options, without messages of the validation layers.
+fn render(options: Options) -> Outcome {
+    let outcome = example::render(options).unwrap();
+    assert!(outcome.messages.is_empty(), "{options:?}: validation:\n{}", outcome.messages.join("\n"));
+    outcome
+}
+
+fn default() -> Options {
+    Options::default()
+}
+
+/// A pass of a host with common depth and y up.
+fn pass(depth: vk::Format) -> Options {
+    Options { is_reversed: false, depth: Some(depth), has_render_pass: true, is_y_up: true, ..default() }
+}
+
+/// In every convention of a host, cubes and terrain hide each other.
+#[test]
+fn every_host_gets_the_same_picture() {
+    let common = Options { is_reversed: false, ..default() };
+    let stencil = Some(vk::Format::D32_SFLOAT_S8_UINT);
+    let cases = [
+        default(),
+        Options { far_m: Some(60_000.0), ..common },
+        pass(vk::Format::X8_D24_UNORM_PACK32),
+        Options { is_reversed: true, far_m: Some(60_000.0), ..pass(vk::Format::X8_D24_UNORM_PACK32) },
+        Options { depth: stencil, ..default() },
+        pass(vk::Format::D32_SFLOAT_S8_UINT),
+    ];
     on_device(|_| {
-        let outcome = example::render(options).unwrap();
-        assert!(outcome.messages.is_empty(), "validation:\n{}", outcome.messages.join("\n"));
-        let stats = outcome.stats;
-        assert!(stats.error_bound_px == Some(1.0) && stats.pending == 0 && stats.triangles > 10_000, "{stats:?}");
-        golden::check(&outcome.picture, "embed");
+        for options in cases {
+            let Outcome { picture, stats, .. } = render(options);
+            let is_exact = stats.error_bound_px == Some(1.0) && stats.pending == 0;
+            assert!(is_exact && stats.triangles > 10_000, "{options:?}: {stats:?}");
+            golden::check(&picture, "embed");
+        }
     });
 }
 
+/// Resolved samples soften edges: every pixel lies between its neighbours in a picture of one sample.
 #[test]
-fn cubes_and_terrain_hide_each_other_in_reversed_depth() {
-    check(Options::default());
+fn several_samples_soften_edges_and_change_nothing_else() {
+    on_device(|_| {
+        let single = render(default()).picture;
+        for has_render_pass in [false, true] {
+            let options = Options { samples: vk::SampleCountFlags::TYPE_4, has_render_pass, ..default() };
+            let resolved = render(options).picture;
+            let (_, changed) = difference(&single, &resolved, 5);
+            let outliers = resolved.enumerate_pixels().filter(|&(x, y, pixel)| !lies_between(&single, [x, y], pixel));
+            let outliers = outliers.count() as f64 / f64::from(single.width() * single.height());
+            println!("changed: {changed}, outside of their neighbours: {outliers}");
+            assert!(changed > 0.002 && outliers < 0.002, "{options:?}: {changed} changed, {outliers} outliers");
+        }
+    });
 }
 
-#[test]
-fn they_do_so_in_common_depth_with_a_far_plane() {
-    check(Options { is_reversed: false, far_m: Some(60_000.0), ..Options::default() });
+/// Returns true if a pixel lies between the least and the largest value, in each channel, of a pixel and its neighbours.
+fn lies_between(picture: &image::RgbaImage, [x, y]: [u32; 2], pixel: &image::Rgba<u8>) -> bool {
+    let [xs, ys] = [(x, picture.width()), (y, picture.height())].map(|(at, n)| at.saturating_sub(1)..n.min(at + 2));
+    (0..4).all(|channel| {
+        let near = ys.clone().flat_map(|y| xs.clone().map(move |x| picture.get_pixel(x, y).0[channel]));
+        let [low, high] = near.fold([255, 0], |[low, high], value: u8| [low.min(value), high.max(value)]);
+        (low.saturating_sub(8)..=high.saturating_add(8)).contains(&pixel.0[channel])
+    })
 }
 
+/// Without a depth buffer a technique that draws from back to front gives the picture of one with a depth buffer; the
+/// others are refused.
 #[test]
-fn they_do_so_in_a_render_pass_with_24_bits_of_depth_and_y_up() {
-    let depth = vk::Format::X8_D24_UNORM_PACK32;
-    let own = Options::default();
-    let pass = Options { is_reversed: false, depth, has_render_pass: true, is_y_up: true, ..own };
-    check(pass);
-    check(Options { is_reversed: true, far_m: Some(60_000.0), ..pass });
+fn without_depth_the_painters_order_counts() {
+    on_device(|_| {
+        let settings = &[("order", "painter")][..];
+        let painter = Options { technique: "sorted-strips", settings, has_cubes: false, ..default() };
+        let [deep, flat] = [painter.depth, None].map(|depth| render(Options { depth, ..painter }));
+        assert!(flat.stats.triangles > 10_000 && flat.stats == deep.stats, "{:?}", flat.stats);
+        assert_eq!(difference(&deep.picture, &flat.picture, 0), (0, 0.0));
+        let refused = example::render(Options { settings: &[("order", "front")], depth: None, ..painter });
+        let error = refused.map(|outcome| outcome.stats).unwrap_err().to_string();
+        assert!(error.contains("it needs a depth attachment"), "{error}");
+    });
+}
+
+/// Of a host's allocator all memory of the terrain is allocated, or none if it is not lent. The host checks that none is
+/// left.
+#[test]
+fn memory_comes_from_the_lent_allocator() {
+    on_device(|_| {
+        let [lent, own] = [true, false].map(|lends_allocator| render(Options { lends_allocator, ..default() }));
+        // Heights of the demo: two bytes each.
+        assert!(lent.borrowed_bytes > 1 << 20, "{} bytes", lent.borrowed_bytes);
+        assert_eq!(own.borrowed_bytes, 0);
+        assert_eq!(lent.picture, own.picture);
+    });
 }
 
 /// Smooth tiles upload geometry with their selections: a selection that was never drawn must not take it along.
 #[test]
 fn a_dropped_frame_loses_no_uploads() {
     on_device(|_| {
-        let drawn = [false, true].map(|drops_a_frame| {
-            let options = Options { technique: "smooth-tiles", drops_a_frame, ..Options::default() };
-            example::render(options).unwrap()
-        });
-        assert!(drawn.iter().all(|outcome| outcome.messages.is_empty()), "{:?}", drawn[1].messages);
-        assert_eq!(drawn[0].picture, drawn[1].picture);
+        let all_drawn = Options { technique: "smooth-tiles", ..default() };
+        let expected = render(all_drawn).picture;
+        for dropped in 0..FRAMES {
+            let picture = render(Options { dropped_frame: Some(dropped), ..all_drawn }).picture;
+            assert_eq!(difference(&picture, &expected, 0), (0, 0.0), "frame {dropped} dropped");
+        }
     });
+}
+
+/// `update` may run on any thread.
+#[test]
+fn a_renderer_may_move_to_another_thread() {
+    fn is_send<T: Send>() {}
+    is_send::<TerrainRenderer>();
 }
 
 #[test]

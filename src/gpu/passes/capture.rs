@@ -10,13 +10,13 @@ use anyhow::{Result, bail};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::draw::layout::{Captured, CapturedPart};
 use crate::draw::{Draw, DrawList, Geometry, RESTART, Source, Topology, expand};
 use crate::gpu::bindings::{Bindings, Bound};
 use crate::gpu::device::Gpu;
 use crate::gpu::frames::Recording;
 use crate::gpu::memory::{Buffer, memory_barrier};
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::pipelines;
 use crate::gpu::terrain::Terrain;
 use crate::plan::ScenePlan;

@@ -9,12 +9,12 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 
 use super::capture::Capture;
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::draw::layout::{ErrorPassInput, TriangleError};
 use crate::gpu::bindings::{Bindings, Bound};
 use crate::gpu::device::Gpu;
 use crate::gpu::frames::Recording;
 use crate::gpu::memory::{Buffer, memory_barrier};
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::pipelines;
 use crate::gpu::shaders::Constants;
 use crate::gpu::terrain::Terrain;

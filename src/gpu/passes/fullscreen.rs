@@ -9,10 +9,9 @@ use crate::gpu::bindings::{Bindings, Bound};
 use crate::gpu::device::Gpu;
 use crate::gpu::frames::Recording;
 use crate::gpu::height_pages::{self, Sampler, Sampling};
+use crate::gpu::pass::MakeInput;
 use crate::gpu::pipelines::{self, Description};
 use crate::gpu::shaders::Constants;
-
-use super::MakeInput;
 
 /// Pipeline and descriptors of one full-screen triangle.
 pub(in crate::internal::gpu) struct Fullscreen {

@@ -9,11 +9,11 @@ use egui::epaint::{ClippedPrimitive, Mesh, Primitive, Vertex};
 use egui_ash_renderer::allocator::Allocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, RendererError, RendererResult};
 
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
-use crate::gpu::device::Gpu;
-use crate::gpu::frames::{Recording, SLOTS};
+use crate::gpu::device::{FRAMES_IN_FLIGHT, Gpu};
+use crate::gpu::formats::Formats;
+use crate::gpu::frames::Recording;
 use crate::gpu::memory::{Buffer, Image, ImageInfo};
-use crate::gpu::target::Formats;
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::terrain::Terrain;
 
 pub(super) static ROW: Row =
@@ -50,7 +50,7 @@ impl Hud {
     pub fn new(gpu: &Arc<Gpu>, formats: Formats) -> Result<Self> {
         let mode = mode(formats);
         let is_srgb = format!("{:?}", formats.colour).contains("SRGB");
-        let options = Options { in_flight_frames: SLOTS, srgb_framebuffer: is_srgb, ..Default::default() };
+        let options = Options { in_flight_frames: FRAMES_IN_FLIGHT, srgb_framebuffer: is_srgb, ..Default::default() };
         let renderer = Renderer::with_allocator(Accounted(Arc::clone(gpu)), gpu.raw.clone(), mode, options)
             .context("the overlay's pipeline")?;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.queue_family);

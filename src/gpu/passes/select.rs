@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::draw::Submission;
 use crate::gpu::frames::Recording;
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::terrain::Terrain;
 
 pub(super) static ROW: Row = Row {

@@ -9,9 +9,9 @@ use anyhow::Result;
 use ash::vk;
 
 use super::fullscreen::Fullscreen;
-use super::{MakeInput, Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::device::Gpu;
 use crate::gpu::frames::Recording;
+use crate::gpu::pass::{MakeInput, Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::target::Offscreen;
 use crate::gpu::terrain::Terrain;
 use crate::plan::ScenePlan;

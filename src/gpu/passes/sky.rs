@@ -3,8 +3,8 @@
 
 use anyhow::Result;
 
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::frames::Recording;
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::terrain::Terrain;
 
 /// The sky before the terrain.

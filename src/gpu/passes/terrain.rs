@@ -2,11 +2,11 @@
 
 use anyhow::Result;
 
-use super::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::frames::Recording;
+use crate::gpu::pass::{Occurs, Origin, Pass, PassInput, Resource, Row};
 use crate::gpu::terrain::Terrain;
 
-pub(super) static ROW: Row = Row {
+pub(in crate::internal::gpu) static ROW: Row = Row {
     name: "terrain",
     reads: &[Resource::Uniforms, Resource::Geometry, Resource::Commands, Resource::Textures],
     writes: &[Resource::Colour, Resource::Depth],

@@ -3,7 +3,7 @@
 use ash::vk;
 use glam::{DMat4, DVec4};
 
-use crate::gpu::target::Formats;
+use super::formats::Formats;
 use crate::view::{Lens, View};
 
 /// The caller's attachments and clip space.
