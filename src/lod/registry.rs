@@ -4,7 +4,10 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::{Entry, Settings, TECHNIQUES, Technique};
+use super::entry::Entry;
+use super::settings::Settings;
+use super::table::TECHNIQUES;
+use super::technique::Technique;
 use crate::height::Field;
 
 /// The techniques that a program offers: the built-in [`TECHNIQUES`], and a caller's own.

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use cuesta::internal::draw::expand::Drawn;
 use cuesta::internal::height::surface::{Corner, doubled_area};
 use cuesta::internal::height::{Field, demo, synth};
-use cuesta::internal::measure::watertight::{self, CounterExample, Kind, plan};
+use cuesta::internal::measure::watertight::{self, CounterExample, Kind};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
-use super::{drawn, select, technique};
+use super::{drawn, plan, select, technique};
 
 struct Scene {
     field: Arc<Field>,

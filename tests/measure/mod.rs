@@ -5,6 +5,7 @@ mod between;
 mod faults;
 mod journeys;
 mod peers;
+mod plan;
 mod pops;
 mod rays;
 

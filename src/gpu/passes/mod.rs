@@ -5,7 +5,6 @@
 //! rendering begins and ends, the barriers between passes, and the images that post-processing reads.
 
 pub mod capture;
-pub mod error_pass;
 pub(super) mod fullscreen;
 #[cfg(feature = "viewer")]
 pub mod hud;
@@ -45,7 +44,6 @@ pub static PASSES: &[&Row] = &[
     #[cfg(feature = "viewer")]
     &hud::ROW,
     &capture::ROW,
-    &error_pass::ROW,
 ];
 
 /// A resource of a frame that passes read and write.
@@ -70,8 +68,6 @@ pub enum Resource {
     DrawnDepth,
     /// Vertices as the vertex shaders placed them.
     Vertices,
-    /// Errors of captured triangles.
-    Errors,
 }
 
 /// Parts of a frame in which a pass runs, if the frame is submitted in several.

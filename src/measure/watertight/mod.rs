@@ -23,7 +23,6 @@
 pub mod cave;
 pub mod counter_example;
 mod edges;
-pub mod plan;
 mod seams;
 mod sweep;
 mod vertices;
