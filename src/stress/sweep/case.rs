@@ -1,19 +1,17 @@
 //! A sweep case as plain data, and its check against every invariant.
 
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::str::FromStr;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Failure;
 use super::terrain::Terrain;
 use super::viewpoint::Viewpoint;
 use crate::height::Field;
 use crate::lod::{self, Entry, Settings};
-use crate::stress::invariants::{INVARIANTS, Subject, Violation};
-use crate::stress::panic_text;
+use crate::stress::invariants::{self, Subject, Violation};
+use crate::stress::panics;
 use crate::view::{Metric, Tolerance, View};
 
 /// A technique with settings, terrain, a view and a tolerance.
@@ -36,6 +34,23 @@ pub struct SweepCase {
     /// True for the paper's error metric, false for the certified one.
     #[serde(default)]
     pub paper_metric: bool,
+}
+
+/// A case that violates an invariant.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// The case.
+    pub case: SweepCase,
+    /// Name of the invariant.
+    pub invariant: &'static str,
+    /// The violation.
+    pub violation: Violation,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
+    }
 }
 
 impl SweepCase {
@@ -64,9 +79,9 @@ impl SweepCase {
     pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];
-        match catch_unwind(AssertUnwindSafe(|| self.keeps_invariants(entry, &field, &views))) {
+        match panics::caught(|| self.keeps_invariants(entry, &field, &views)) {
             Ok(outcome) => outcome.map_err(|(invariant, violation)| self.fails(invariant, violation)),
-            Err(panic) => Err(self.fails("no panic", Violation::new(views[0], panic_text(&*panic)))),
+            Err(text) => Err(self.fails("no panic", Violation::new(views[0], text))),
         }
     }
 
@@ -85,9 +100,8 @@ impl SweepCase {
         let mut technique = prepared.map_err(|why| ("it can be prepared", Violation::new(views[0], why)))?;
         let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
         let mut subject =
-            Subject { field, technique: &mut *technique, views, tolerances_px: &tolerances_px, time_s: 0.0 };
-        let mut invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(&self.technique));
-        invariants
+            Subject { tolerances_px: &tolerances_px, ..Subject::new(field, &mut *technique, views) };
+        invariants::of_technique(&self.technique)
             .try_for_each(|invariant| (invariant.check)(&mut subject).map_err(|violation| (invariant.name, violation)))
     }
 }

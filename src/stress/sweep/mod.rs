@@ -13,10 +13,10 @@ pub mod viewpoint;
 
 use rayon::prelude::*;
 
-pub use self::case::SweepCase;
+pub use self::case::{Failure, SweepCase};
+use super::case::{Case, Kind};
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
-use super::invariants::Violation;
-use super::{Case, Finding, Kind};
 
 /// The family `sweep`.
 pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::PerTechnique(of_config) }];
@@ -27,23 +27,6 @@ const SUITE_SEED: u64 = 19;
 
 /// Maximum number of failures that are shrunk; each takes as long as hundreds of cases.
 const MAX_SHRUNK: usize = 4;
-
-/// A case that violates an invariant.
-#[derive(Clone, Debug)]
-pub struct Failure {
-    /// The case.
-    pub case: SweepCase,
-    /// Name of the invariant.
-    pub invariant: &'static str,
-    /// The violation.
-    pub violation: Violation,
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
-    }
-}
 
 /// Checks cases of built-in techniques on all cores. Returns the failures in order, the first few of them shrunk.
 pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
