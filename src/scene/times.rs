@@ -22,8 +22,7 @@ impl Times {
     ///
     /// # Panics
     /// If there are no frames.
-    pub /// Returns the median of some values.
-pub(super) fn median(mut frames: Vec<Times>) -> Times {
+    pub fn median(mut frames: Vec<Times>) -> Times {
         frames.sort_by(|a, b| a.gpu.total_ms.total_cmp(&b.gpu.total_ms));
         let of = |time: fn(&Times) -> f64| median(frames.iter().map(time).collect());
         Times {
@@ -36,7 +35,8 @@ pub(super) fn median(mut frames: Vec<Times>) -> Times {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// Returns the median of some values.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }

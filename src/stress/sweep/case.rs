@@ -99,8 +99,7 @@ impl SweepCase {
         let prepared = settings.and_then(|settings| entry.prepare(field, &settings));
         let mut technique = prepared.map_err(|why| ("it can be prepared", Violation::new(views[0], why)))?;
         let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
-        let mut subject =
-            Subject { tolerances_px: &tolerances_px, ..Subject::new(field, &mut *technique, views) };
+        let mut subject = Subject { tolerances_px: &tolerances_px, ..Subject::new(field, &mut *technique, views) };
         invariants::of_technique(&self.technique)
             .try_for_each(|invariant| (invariant.check)(&mut subject).map_err(|violation| (invariant.name, violation)))
     }
