@@ -43,7 +43,7 @@ fn in_parts(list: &DrawList) -> DrawList {
 fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     let field = terrain();
     let views = [8.0, 9.0].map(|x| view(&field, x));
-    let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10")]);
+    let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=10"]);
     let lists = views.each_ref().map(|view| select(&mut *strips, view));
     let finer = lists.each_ref().map(in_parts);
     let resident = strips.resident();
@@ -77,7 +77,7 @@ fn corner_at(triangle: &Drawn, at: [i32; 2]) -> Option<usize> {
 fn faults_of_parts_of_a_sample_are_found() {
     let field = terrain();
     let view = view(&field, 8.0);
-    let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10"), ("blend", "end")]);
+    let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=10", "blend=end"]);
     let list = select(&mut *strips, &view);
     let triangles = drawn(&field, &view, &*strips, &list);
     let prove = |triangles: &[Drawn]| {

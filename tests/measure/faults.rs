@@ -31,7 +31,7 @@ fn scene() -> Scene {
         tolerance: Tolerance { px: 20.0, metric: Metric::Certified },
         time_s: 0.0,
     };
-    let mut technique = technique(&field, "geomipmap", &[("block", "17")]);
+    let mut technique = technique(&field, "geomipmap", &["block=17"]);
     let list = select(&mut *technique, &view);
     assert!(list.levels().iter().filter(|&&n| n > 0).count() >= 3, "levels {:?}", list.levels());
     let triangles = drawn(&field, &view, &*technique, &list);
