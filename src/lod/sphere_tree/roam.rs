@@ -2,7 +2,7 @@
 //!
 //! Based on M. Duchaineau et al., "ROAMing Terrain: Real-time Optimally Adapting Meshes" (1997), §6: a priority is
 //! recomputed only when it may have reached the threshold, given the viewpoint's maximum speed. Here a diamond's slack
-//! is a distance. It is due when the viewpoint has travelled that distance, which is known and needs no maximum. The
+//! is a distance. It is due when the viewpoint has travelled that distance, or could have at the maximum speed. The
 //! queue ignores directions: a diamond that recedes is checked as often as one that approaches.
 
 use std::cmp::Reverse;
@@ -23,6 +23,8 @@ pub struct Queues {
     /// Distance that the viewpoint has travelled so far, metres.
     travelled: f64,
     eye: Option<DVec3>,
+    /// Maximum speed, metres a frame; 0 to use the actual distance.
+    pub largest_speed: f64,
 }
 
 impl CrossingTracker for Queues {
@@ -33,7 +35,7 @@ impl CrossingTracker for Queues {
 
     fn due(&mut self, from: &Viewpoint, handles: &mut Vec<TrackingHandle>, _visited: &mut usize) {
         if let Some(eye) = self.eye {
-            self.travelled += eye.distance(from.eye) * (1.0 + 1e-9);
+            self.travelled += eye.distance(from.eye).max(self.largest_speed) * (1.0 + 1e-9);
         }
         self.eye = Some(from.eye);
         for queue in &mut self.queues {
