@@ -12,9 +12,9 @@ use std::time::Instant;
 use cuesta::internal::cli::whole::Whole;
 use cuesta::internal::draw::DrawList;
 use cuesta::internal::height::{self, Field, Options, synth};
-use cuesta::internal::lod;
+use cuesta::internal::lod::{self, TECHNIQUES};
 use cuesta::internal::stress::invariants::{INVARIANTS, Subject};
-use cuesta::internal::stress::sweep::{self, SweepCase, random, shrink};
+use cuesta::internal::stress::sweep::{self, Failure, SweepCase, random, shrink};
 use cuesta::internal::stress::views;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
@@ -31,20 +31,23 @@ fn set<T: FromStr>(key: &str) -> Option<T> {
     Some(value.parse().unwrap_or_else(|_| panic!("{key}={value}: invalid value")))
 }
 
+/// Checks a case with its own technique.
+fn check(case: &SweepCase) -> Result<(), Box<Failure>> {
+    case.check(lod::find(&case.technique).expect("a technique"))
+}
+
 #[test]
 fn random_cases_keep_every_invariant() {
     if let Some(case) = set::<SweepCase>("SWEEP_CASE") {
-        case.check().unwrap_or_else(|failure| panic!("{failure}"));
+        check(&case).unwrap_or_else(|failure| panic!("{failure}"));
         return;
     }
     let (cases, seed) = (set("SWEEP_CASES").unwrap_or(CASES), set("SWEEP_SEED").unwrap_or(SEED));
     let entry = set::<String>("SWEEP_TECHNIQUE").map(|name| lod::find(&name).expect("a technique"));
-    let case = |number| match entry {
-        Some(entry) => random::case(seed, number, entry, None),
-        None => random::any(seed, number),
-    };
+    let entry_of = |number: u64| entry.unwrap_or(&TECHNIQUES[(number % TECHNIQUES.len() as u64) as usize]);
+    let case = |number| random::case(seed, number, entry_of(number), None);
     let start = Instant::now();
-    let failures = sweep::run((0..cases).into_par_iter().map(case));
+    let failures = sweep::run((0..cases).into_par_iter().map(case), check);
     let minutes = start.elapsed().as_secs_f64() / 60.0;
     println!("{cases} cases, {:.0} a minute, {} fail", cases as f64 / minutes, failures.len());
     let few: Vec<_> = failures.iter().take(8).map(ToString::to_string).collect();
@@ -131,7 +134,7 @@ const FOUND: [&str; 6] = [
 fn past_failures_stay_fixed() {
     for line in FOUND {
         let case: SweepCase = line.parse().expect("a case");
-        case.check().unwrap_or_else(|failure| panic!("{failure}"));
+        check(&case).unwrap_or_else(|failure| panic!("{failure}"));
     }
 }
 
@@ -151,9 +154,9 @@ fn flat_fields_take_few_triangles() {
 #[test]
 fn broken_techniques_are_detected_and_shrunk() {
     let case = |number| random::case(SEED, number, &BLOCK_LOST, None);
-    let failures: Vec<_> = (0..20).filter_map(|number| case(number).check_with(&BLOCK_LOST).err()).collect();
+    let failures: Vec<_> = (0..20).filter_map(|number| case(number).check(&BLOCK_LOST).err()).collect();
     assert!(failures.len() > 5, "{} of 20 cases fail", failures.len());
-    let shrunk = shrink::shrink(*failures[0].clone(), |case| case.check_with(&BLOCK_LOST));
+    let shrunk = shrink::shrink(*failures[0].clone(), |case| case.check(&BLOCK_LOST));
     let SweepCase { terrain, settings, .. } = &shrunk.case;
     assert_eq!((terrain.kind.as_str(), terrain.size), ("flat", [2, 2]), "{shrunk}");
     assert!(settings.is_empty() && shrunk.invariant == "one surface", "{shrunk}");

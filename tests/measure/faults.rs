@@ -40,7 +40,7 @@ fn scene() -> Scene {
 
 impl Scene {
     fn prove(&self, triangles: &[Drawn]) -> Result<watertight::Proof, Box<CounterExample>> {
-        watertight::prove(&self.field, &self.view.frustum(), triangles)
+        watertight::prove(&self.field, &self.view.frustum(), triangles, 0)
     }
 
     /// The fault of the triangles, which is where it was planted and can be written and drawn.

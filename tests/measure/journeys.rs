@@ -38,7 +38,7 @@ fn fly(frames: usize, name: &str, settings: &[&str]) -> (usize, usize, f64) {
                 let what = format!("{name} {settings:?}, {file}, {}, frame {k} of {frames}", path.name);
                 let list = select(&mut *technique, &view);
                 let drawn = drawn(&field, &view, &*technique, &list);
-                let proof = watertight::prove(&field, &view.frustum(), &drawn);
+                let proof = watertight::prove(&field, &view.frustum(), &drawn, 0);
                 let proof = proof.unwrap_or_else(|why| panic!("{what}: {why}"));
                 let errors = geometric::errors(&field, &view, technique.resident(), &list);
                 let share = errors.screen_px.max / view.tolerance.px;

@@ -117,13 +117,6 @@ struct Walk<'a, L> {
 }
 
 impl<L: Levels> WalkContext<'_, L> {
-    /// Walks a row of pages.
-    pub fn walk(&self, row: &Row) -> Stream {
-        let mut worker = Worker::default();
-        self.walk_on(row, &mut worker);
-        worker.stream
-    }
-
     /// Walks a row of pages and appends it to the worker's stream.
     pub fn walk_on(&self, row: &Row, worker: &mut Worker) {
         let side = self.pages.grid.side();

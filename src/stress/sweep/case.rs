@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::terrain::Terrain;
 use super::viewpoint::Viewpoint;
 use crate::height::Field;
-use crate::lod::{self, Entry, Settings};
+use crate::lod::{Entry, Settings};
 use crate::stress::invariants::{self, Subject, Violation};
 use crate::stress::panics;
 use crate::view::{Metric, Tolerance, View};
@@ -54,11 +54,6 @@ impl fmt::Display for Failure {
 }
 
 impl SweepCase {
-    /// Returns the technique's table entry.
-    pub fn entry(&self) -> Result<&'static Entry, String> {
-        lod::find(&self.technique).ok_or_else(|| format!("{}: no such technique", self.technique))
-    }
-
     /// Creates the terrain and the view.
     pub fn scene(&self) -> (Arc<Field>, View) {
         let field = Arc::new(self.terrain.field());
@@ -67,16 +62,8 @@ impl SweepCase {
         (field, view)
     }
 
-    /// Checks every invariant. Returns the first failure; a panic is a failure.
-    pub fn check(&self) -> Result<(), Box<Failure>> {
-        match self.entry() {
-            Ok(entry) => self.check_with(entry),
-            Err(why) => Err(self.fails("it can be prepared", Violation::new(("the case's view", self.scene().1), why))),
-        }
-    }
-
-    /// Checks with another table entry in place of the technique's.
-    pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
+    /// Checks every invariant with the table entry of the technique. Returns the first failure; a panic is a failure.
+    pub fn check(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];
         match panics::caught(|| self.keeps_invariants(entry, &field, &views)) {
