@@ -1,4 +1,4 @@
-//! What a viewer session starts with, and what it reports at its end.
+//! Options of a viewer session, and the statistics at its end.
 
 use std::path::Path;
 use std::sync::Arc;
