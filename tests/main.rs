@@ -18,6 +18,7 @@ mod height;
 mod lod;
 #[cfg(feature = "bench")]
 mod measure;
+mod prepared;
 #[cfg(feature = "bench")]
 mod profile;
 #[cfg(feature = "cli")]

@@ -13,7 +13,7 @@ use super::run::{BenchBackend, BenchScene, Timed};
 use super::sample::FrameSample;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout;
-use crate::draw::{DrawList, Geometry};
+use crate::draw::{DrawList, Geometry, PipelineRequirements};
 use crate::gpu::Gpu;
 use crate::height::Field;
 use crate::lod::{Settings, Technique, TechniqueSpec, Techniques};
@@ -52,8 +52,7 @@ impl DeviceBackend {
     }
 
     fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
-        let plan = ScenePlan::builder(field, &self.look, &self.gpu.device_limits());
-        plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
+        scene::plan(&self.gpu, field, &self.look, None, technique.pipeline_requirements())
     }
 
     /// A freshly prepared technique and its renderer.
@@ -75,9 +74,7 @@ impl DeviceBackend {
             self.truths = (name, BTreeMap::new());
         }
         if !self.truths.1.contains_key(&frame) {
-            let plan = ScenePlan::builder(scene.field, &self.look, &self.gpu.device_limits())
-                .build()
-                .map_err(anyhow::Error::msg)?;
+            let plan = scene::plan(&self.gpu, scene.field, &self.look, None, PipelineRequirements::default())?;
             let look = self.look.after(frame as f64 * TIME_STEP_S);
             let of_frame = scene::Scene { look: &look, ..self.scene(scene.field, &plan) };
             let truth = Truth::new(&of_frame, &scene.views[frame])?;
@@ -93,8 +90,7 @@ impl BenchBackend for DeviceBackend {
         let device =
             Device { name: candidate.name.clone(), driver: candidate.driver.clone(), is_cpu: candidate.is_software() };
         let plan = |(terrain, field): &(Terrain, Arc<Field>)| {
-            let plan =
-                ScenePlan::builder(field, &self.look, &self.gpu.device_limits()).build().map_err(anyhow::Error::msg)?;
+            let plan = scene::plan(&self.gpu, field, &self.look, None, PipelineRequirements::default())?;
             let (kept, left_out) = plan.decisions(field, None);
             let [kept, left_out] = [kept, left_out].map(|all| all.into_iter().map(decision).collect());
             Ok(Plan { terrain: terrain.name.clone(), kept, left_out })

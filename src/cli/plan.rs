@@ -113,12 +113,10 @@ fn plan(
     (field, look, overlay): Scenery,
     technique: &dyn Technique,
 ) -> Result<(ScenePlan, Option<Measured>)> {
-    use crate::scene::{Scene, savings};
+    use crate::scene::{self, Scene, savings};
 
     let gpu = super::render::open(common, false)?;
-    let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
-    let plan = ScenePlan::builder(field, look, &limits).overlay(picture);
-    let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
+    let plan = scene::plan(&gpu, field, look, overlay, technique.pipeline_requirements())?;
     let Some(frames) = args.measure else {
         return Ok((plan, None));
     };

@@ -12,14 +12,14 @@ use super::render::open;
 use super::scene::{LookArgs, TerrainArgs, ViewArgs};
 use super::technique::TechniqueArgs;
 use super::{endless, report};
+use crate::draw::PipelineRequirements;
 use crate::gpu::Gpu;
 use crate::gpu::renderdoc::RenderDoc;
 use crate::height::{Field, Loaded};
 use crate::lod::Settings;
-use crate::plan::ScenePlan;
 use crate::profile::run::Measured;
 use crate::profile::{self, Form, Profile, files, rows, table};
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 
 /// Arguments of `cuesta profile`.
 #[derive(Args, Debug)]
@@ -84,9 +84,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
     let gpu = open(common, false)?;
-    let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
-    let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture).build();
-    let plan = plan.map_err(anyhow::Error::msg)?;
+    let plan = scene::plan(&gpu, &field, &look, overlay.as_ref(), PipelineRequirements::default())?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     files::make_folder(&args.out)?;
     let spinner = report::spinner(common, "profiling");

@@ -19,9 +19,8 @@ use crate::height::{Error, Loaded};
 use crate::lod::Technique;
 use crate::measure::summary::Summary;
 use crate::measure::{extended, geometric, watertight};
-use crate::plan::ScenePlan;
 use crate::scene::holes::{Truth, skirts};
-use crate::scene::{RenderResult, Scene};
+use crate::scene::{self, RenderResult, Scene};
 use crate::texture::virtual_overlay;
 use crate::view::{Metric, View};
 
@@ -137,9 +136,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let mut technique = args.technique.build(common, &field)?;
     let prepare_ms = ms(prepared);
     let gpu = open(common, false)?;
-    let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
-    let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture);
-    let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;
+    let plan = scene::plan(&gpu, &field, &look, overlay.as_ref(), technique.pipeline_requirements())?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let rendered = scene.render(technique.as_mut(), &view, args.repeat)?;
     report::save(&args.output, &rendered.picture)?;

@@ -236,33 +236,11 @@ shared! {
         vertices: uint,
     }
 
-    /// The error of one triangle, found by the error pass.
-    struct TriangleError {
-        /// Samples that the triangle counts.
-        samples: uint,
-        /// Sum of the counted vertical errors' squares, m^2.
-        squares_m: float,
-        /// Sum of the counted screen errors' squares, px^2.
-        squares_px: float,
-        /// Largest vertical error, metres.
-        largest_m: float,
-        /// Largest screen error, pixels.
-        largest_px: float,
-    }
-
     /// The head of the commands that a selection on the device writes.
     struct Tally {
         /// Number of commands.
         draws: uint,
         /// 1 if the selection overflowed and drew a coarse fallback.
         overflow: uint,
-    }
-
-    /// Push constants of the error pass.
-    struct ErrorPassInput {
-        /// Half the picture, pixels.
-        half_size: vec2,
-        /// Number of triangles.
-        triangles: uint,
     }
 }

@@ -7,7 +7,9 @@
 
 use std::sync::Arc;
 
-use super::{Entry, Settings, Technique};
+use super::entry::Entry;
+use super::settings::Settings;
+use super::technique::Technique;
 use crate::draw::{Draw, DrawList, Geometry, Instance, LatticeVertex, Limits, Source, Topology};
 use crate::height::surface::has_terrain;
 use crate::height::{Field, MAX_SIDE, rtin};

@@ -4,7 +4,10 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::{Entry, Settings, TECHNIQUES, Technique};
+use super::entry::Entry;
+use super::settings::Settings;
+use super::table::TECHNIQUES;
+use super::technique::Technique;
 use crate::height::Field;
 
 /// The techniques that a program offers: the built-in [`TECHNIQUES`], and a caller's own.
@@ -116,9 +119,12 @@ mod tests {
 
     #[test]
     fn a_spec_is_read_as_it_is_written() {
-        for text in ["geomipmap", "own:one", "own:one:two"] {
+        for (text, variant) in [("own", None), ("own:one", Some("one")), ("own:one:two", Some("one:two"))] {
             let spec: TechniqueSpec = text.parse().unwrap();
-            assert_eq!(spec.to_string(), text);
+            assert_eq!(
+                (spec.name.as_str(), spec.variant.as_deref(), spec.to_string().as_str()),
+                ("own", variant, text)
+            );
         }
         for text in ["", ":one", "own:"] {
             let error = text.parse::<TechniqueSpec>().unwrap_err();
@@ -136,7 +142,12 @@ mod tests {
         }
         let error = Techniques::built_in().entry(&"own".parse().unwrap()).unwrap_err();
         assert!(error.starts_with("own: expected one of brute-force, "), "{error}");
-        let again = std::panic::catch_unwind(|| Techniques::built_in().with(&OWN).with(&OWN));
-        assert!(again.is_err(), "a name is taken once");
+        assert_eq!(techniques.entries().last().unwrap().name, "own");
+        static NAMELESS: Entry = Entry { name: "", ..crate::lod::brute_force::ENTRY };
+        static VARIANT: Entry = Entry { name: "own:one", ..crate::lod::brute_force::ENTRY };
+        for refused in [&OWN, &NAMELESS, &VARIANT] {
+            let added = std::panic::catch_unwind(|| techniques.clone().with(refused));
+            assert!(added.is_err(), "{:?} is refused", refused.name);
+        }
     }
 }

@@ -58,11 +58,6 @@ impl Histogram {
             mine.count += theirs.count;
         }
     }
-
-    /// Returns the number of all values.
-    pub fn total(&self) -> u64 {
-        self.bins.iter().map(|bin| bin.count).sum()
-    }
 }
 
 #[cfg(test)]
@@ -81,6 +76,5 @@ mod tests {
         }
         let counts: Vec<u64> = histogram.bins.iter().map(|bin| bin.count).collect();
         assert_eq!(counts, [3, 2, 0, 2, 0, 1, 2]);
-        assert_eq!(histogram.total(), 10);
     }
 }

@@ -20,6 +20,8 @@ use crate::view::{Lens, View};
 #[derive(Clone, Debug, Default)]
 pub struct Pool {
     errors_px: Vec<f32>,
+    /// Number of covered pixels without terrain above or below the shown point, by rounding at a border or a hole. They
+    /// have no error.
     beside: u64,
 }
 
@@ -57,12 +59,6 @@ impl Pool {
     /// Returns the number of covered pixels.
     pub fn pixels(&self) -> u64 {
         self.errors_px.len() as u64 + self.beside
-    }
-
-    /// Returns the number of covered pixels without terrain above or below the shown point, by rounding at a border or
-    /// a hole. They have no error.
-    pub fn beside(&self) -> u64 {
-        self.beside
     }
 
     /// Returns the statistics of all errors so far; zeros without any. Percentiles are exact, by rank.
@@ -216,7 +212,7 @@ mod tests {
             let found = pool.summary();
             expected.sort_by(f64::total_cmp);
             let n = expected.len();
-            assert!(pool.pixels() - pool.beside() >= n as u64 - 2 && pool.beside() < 20, "{pool:?}");
+            assert!(pool.pixels() - pool.beside >= n as u64 - 2 && pool.beside < 20, "{pool:?}");
             let mean = expected.iter().sum::<f64>() / n as f64;
             let rms = (expected.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
             let [p95, p99] = [95, 99].map(|percent| expected[n * percent / 100]);
@@ -252,7 +248,7 @@ mod tests {
         alone.add(&field, &view, &lifted);
         pool.add(&field, &view, &lifted);
         assert_eq!(pool.pixels(), one.pixels() + alone.pixels());
-        let share = (alone.pixels() - alone.beside()) as f64 / (pool.pixels() - pool.beside()) as f64;
+        let share = (alone.pixels() - alone.beside) as f64 / (pool.pixels() - pool.beside) as f64;
         let (alone, both) = (alone.summary(), pool.summary());
         assert!(alone.mean > 0.5, "{alone:?}");
         assert!((both.mean - alone.mean * share).abs() < 1e-3 && both.max == alone.max, "{both:?}, {alone:?}");

@@ -6,11 +6,11 @@ pub fn outline_radius(tolerance_px: f64) -> usize {
     tolerance_px.ceil() as usize + 1
 }
 
-/// Pixels that any pixel of `mask` comes within `radius` of (in x and in y).
+/// Dilates a mask: pixels that any pixel of `mask` comes within `radius` of (in x and in y).
 ///
 /// # Panics
 /// If the mask is no whole number of rows.
-pub fn select_within_limits(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
+pub fn dilated(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
     let open: Vec<bool> = mask.iter().map(|m| !m).collect();
     inside(&open, width, radius).into_iter().map(|m| !m).collect()
 }

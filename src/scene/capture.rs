@@ -1,13 +1,12 @@
-//! The as-drawn mesh: triangles captured on the device, and their errors measured there.
+//! The as-drawn mesh: triangles captured on the device.
 
 use anyhow::Result;
 
-use super::SceneRenderer;
+use super::renderer::SceneRenderer;
 use crate::draw::expand::{self, Drawn};
 use crate::draw::layout::Captured;
 use crate::draw::{DrawList, Geometry, Submission};
 use crate::gpu::passes::capture::{Capture, Part};
-use crate::gpu::passes::error_pass::{self, ErrorPass, Summary};
 use crate::gpu::target::Copies;
 use crate::height::surface::{Corner, doubled_area};
 use crate::lod::Technique;
@@ -35,7 +34,7 @@ impl SceneRenderer {
     pub fn capture(&mut self, technique: &dyn Technique, view: &View) -> Result<[Vec<AsDrawn>; 2]> {
         let mut found = [Vec::new(), Vec::new()];
         let resident = technique.resident();
-        self.each_batch(resident, view, |_, capture, batch, list| {
+        self.each_batch(resident, view, |capture, batch, list| {
             let records = capture.records();
             for part in batch {
                 triangles(resident, list, part, records, |drawn, corners| {
@@ -43,43 +42,8 @@ impl SceneRenderer {
                     found[usize::from(expand::is_upright(&drawn))].push(AsDrawn { drawn, relative });
                 });
             }
-            Ok(())
         })?;
         Ok(found)
-    }
-
-    /// Measures the last list on the device: vertical errors in metres and screen errors in pixels, single precision. For
-    /// lists too large for [`crate::measure::geometric::errors`].
-    ///
-    /// # Errors
-    /// If the device cannot capture, or fails.
-    pub fn errors(&mut self, technique: &dyn Technique, view: &View) -> Result<[Summary; 2]> {
-        let resident = technique.resident();
-        let mut error_pass: Option<ErrorPass> = None;
-        self.each_batch(resident, view, |renderer, capture, batch, list| {
-            let layout = renderer.renderer.terrain.set_layout();
-            let pass = match &mut error_pass {
-                Some(pass) => pass,
-                none => none.insert(ErrorPass::new(&renderer.gpu, &renderer.plan, layout, capture)?),
-            };
-            let mut surface = Vec::new();
-            for part in batch {
-                triangles(resident, list, part, capture.records(), |drawn, corners| {
-                    // Skirts are no part of the surface.
-                    if doubled_area(&drawn.corners) != 0 {
-                        surface.push(corners);
-                    }
-                });
-            }
-            for some in surface.chunks(error_pass::TRIANGLES) {
-                let DrawList { fraction_bits, height_base, .. } = *list;
-                let mut nothing = DrawList { fraction_bits, height_base, ..DrawList::default() };
-                renderer.draw_only(&mut pass.triangles(some), view, &mut nothing, Copies::default())?;
-                pass.collect(some.len());
-            }
-            Ok(())
-        })?;
-        Ok(error_pass.map_or([Summary::default(); 2], |error_pass| error_pass.summaries()))
     }
 
     /// Captures the last list batch by batch.
@@ -87,7 +51,7 @@ impl SceneRenderer {
         &mut self,
         resident: &Geometry,
         view: &View,
-        mut visit: impl FnMut(&mut SceneRenderer, &Capture, &[Part], &DrawList) -> Result<()>,
+        mut visit: impl FnMut(&Capture, &[Part], &DrawList),
     ) -> Result<()> {
         let mut capture = match self.capture.take() {
             Some(capture) => capture,
@@ -103,7 +67,8 @@ impl SceneRenderer {
             batches.iter().try_for_each(|batch| {
                 capture.clear();
                 self.draw_only(&mut capture.batch(batch), view, &mut list, Copies::default())?;
-                visit(self, &capture, batch, &list)
+                visit(&capture, batch, &list);
+                Ok(())
             })
         });
         self.list = DrawList { submission, ..list };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 
-use super::Scene;
+use super::renderer::Scene;
 use crate::height::Field;
 use crate::lod::{self, Settings, Technique, sorted_strips};
 use crate::measure::picture;
@@ -84,7 +84,7 @@ impl Masks {
     fn holes(&self, covered: &[bool], radius: usize) -> Vec<usize> {
         let mut holes = picture::hole_pixels(covered, &self.terrain, self.width, radius);
         if let Some(missing) = &self.missing {
-            let missing = picture::select_within_limits(missing, self.width, radius);
+            let missing = picture::dilated(missing, self.width, radius);
             holes.retain(|&k| !missing[k]);
         }
         holes

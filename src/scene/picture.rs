@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use anyhow::{Error, Result, ensure};
+use anyhow::{Result, ensure};
 
-use super::Scene;
+use super::plan::plan;
+use super::renderer::Scene;
 use crate::gpu::{Choice, Gpu, Instance};
 use crate::height::Field;
 use crate::lod::Technique;
-use crate::plan::{Look, ScenePlan};
+use crate::plan::Look;
 use crate::view::View;
 
 /// Draws one view of a field. Returns its colours; alpha is 0 where no terrain was drawn.
@@ -27,10 +28,7 @@ pub fn picture(
 ) -> Result<image::RgbaImage> {
     ensure!(view.size.iter().all(|&side| side > 0), "a picture has at least one pixel a side");
     let gpu = Gpu::new(&Instance::new(&[], false)?, device, false)?;
-    let plan = ScenePlan::builder(field, look, &gpu.device_limits())
-        .requirements(technique.pipeline_requirements())
-        .build()
-        .map_err(Error::msg)?;
+    let plan = plan(&gpu, field, look, None, technique.pipeline_requirements())?;
     let scene = Scene { gpu: &gpu, field, plan: &plan, look, overlay: None };
     let rendered = scene.render(technique, view, 1)?;
     Gpu::close(gpu);

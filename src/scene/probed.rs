@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
+use super::renderer::{Copy, SceneRenderer};
 use super::source::TechniqueSource;
-use super::{Copy, SceneRenderer};
 use crate::draw::{Draw, DrawList, Geometry, Submission};
 use crate::gpu::clock::Clock;
 use crate::gpu::frame_renderer::{Allowed, DrawSource, FrameInput, HostSteps};

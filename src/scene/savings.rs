@@ -2,7 +2,8 @@
 
 use anyhow::{Context, Result};
 
-use super::{Copy, Scene, SceneRenderer, Times, median};
+use super::renderer::{Copy, Scene, SceneRenderer};
+use super::times::{Times, median};
 use crate::gpu::pipelines;
 use crate::lod::Technique;
 use crate::plan::{FEATURES, Feature, ScenePlan, forced};

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use super::case::{Case, Kind};
 use super::fields::hills;
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
-use super::invariants::{Subject, TOLERANCES_PX, Violation};
-use super::{Case, Finding, Kind, views};
+use super::invariants::{Subject, Violation};
+use super::views;
 use crate::draw::DrawList;
 
 /// The family `arithmetic`. Determinism, finite numbers and weights in [0, 1] are checked on every terrain as well.
@@ -50,8 +52,7 @@ fn fine_steps(config: &TechniqueConfig) -> Vec<Finding> {
     let field = hills([129, 97], [10.0; 2], 400.0);
     let mut technique = (config.entry.build)(Arc::new(field.clone()), &config.settings);
     let named = views::views(&field).swap_remove(2);
-    let mut subject =
-        Subject { field: &field, technique: &mut *technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
+    let mut subject = Subject::new(&field, &mut *technique, &[]);
     let mut before = u64::MAX;
     let mut worst: (f64, Option<Violation>) = (0.0, None);
     for px in (0..STEPS).map(|k| 0.125 * 1.01f64.powi(k)) {

@@ -5,16 +5,19 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 
+use super::case::{Case, Flight, Kind, StressTerrain};
+use super::finding::Finding;
+use super::forms::TechniqueConfig;
+use super::image_checker::ImageChecker;
 use super::invariants::Violation;
-use super::{Case, Finding, Flight, ImageChecker, Kind, StressTerrain, TechniqueConfig};
-use crate::draw::expand;
 use crate::draw::layout::Frame;
+use crate::draw::{PipelineRequirements, expand};
 use crate::gpu::Gpu;
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::plan::{Look, ScenePlan};
 use crate::scene::holes::Truth;
-use crate::scene::{Copy, Scene, SceneRenderer};
+use crate::scene::{self, Copy, Scene, SceneRenderer};
 use crate::view::View;
 
 /// Frames of a flight that are drawn.
@@ -48,13 +51,12 @@ impl DeviceImageChecker {
         Gpu::close(self.gpu)
     }
 
-    fn plan(&self, field: &Field, technique: &dyn Technique) -> Result<ScenePlan> {
-        let plan = ScenePlan::builder(field, &self.look, &self.gpu.device_limits());
-        plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)
+    fn plan(&self, field: &Field, requirements: PipelineRequirements) -> Result<ScenePlan> {
+        scene::plan(&self.gpu, field, &self.look, None, requirements)
     }
 
     fn renderer(&self, field: &Arc<Field>, technique: &dyn Technique, size: [u32; 2]) -> Result<SceneRenderer> {
-        let plan = self.plan(field, technique)?;
+        let plan = self.plan(field, technique.pipeline_requirements())?;
         self.scene(field, &plan).renderer(technique, size)
     }
 
@@ -96,8 +98,7 @@ impl DeviceImageChecker {
         renderer.draw(technique, view, Copy::PictureAndDepth)?;
         renderer.complete()?;
         let picture = renderer.picture();
-        let plan =
-            ScenePlan::builder(field, &self.look, &self.gpu.device_limits()).build().map_err(anyhow::Error::msg)?;
+        let plan = self.plan(field, PipelineRequirements::default())?;
         let scene = self.scene(field, &plan);
         let holes = Truth::new(&scene, view)?.hole_pixels(&scene, view, &picture)?.len();
         if holes > 0 && results.holes_at.is_none() {

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Case, Kind, StressTerrain, views};
+use super::case::{Case, Kind, StressTerrain};
+use super::views;
 use crate::height::synth::{self, noise};
 use crate::height::{Field, Holes, Options, Samples, load_bytes};
 

@@ -1,10 +1,10 @@
 //! Broken files: any bytes must give a field within the size limit or a one-line error that names the file, never a
 //! panic.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
+use super::case::{Case, Kind};
 use super::fields::hills;
-use super::{Case, Finding, Kind};
+use super::finding::Finding;
+use super::panics;
 use crate::height::save::save;
 use crate::height::{Error, Loaded, Options, load_bytes};
 
@@ -46,7 +46,7 @@ impl LoadCounts {
     /// panic.
     fn load(&mut self, small: &Small, bytes: &[u8], what: impl Fn() -> String) -> Option<Result<Loaded, Error>> {
         self.loads += 1;
-        let loaded = catch_unwind(AssertUnwindSafe(|| load_bytes(&small.name, bytes, &small.options)));
+        let loaded = panics::caught(|| load_bytes(&small.name, bytes, &small.options));
         let mut fault = |counter: fn(&mut Self) -> &mut u64| {
             *counter(self) += 1;
             self.first.get_or_insert_with(|| format!("{}: {}", small.name, what()));

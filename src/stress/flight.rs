@@ -2,23 +2,16 @@
 
 use std::sync::Arc;
 
-use super::Finding;
+use super::case::Flight;
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
 use super::invariants::{SLACK, Violation};
-use super::terrain::all_numbers;
+use super::numbers::all_numbers;
 use crate::draw::DrawList;
 use crate::height::Field;
 use crate::lod::Technique;
 use crate::measure::{geometric, watertight};
 use crate::view::View;
-
-/// A field and a sequence of views.
-pub struct Flight {
-    /// The field.
-    pub field: Arc<Field>,
-    /// One view per frame.
-    pub views: Vec<View>,
-}
 
 /// Flies with a technique and checks every frame.
 pub fn examine(flight: &Flight, config: &TechniqueConfig) -> Vec<Finding> {

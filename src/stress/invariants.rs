@@ -65,13 +65,6 @@ pub struct Invariant {
     pub check: fn(&mut Subject) -> Result<(), Violation>,
 }
 
-impl Invariant {
-    /// Returns true if the invariant applies to a technique.
-    pub fn is_for(&self, technique: &str) -> bool {
-        self.only.is_empty() || self.only.contains(&technique)
-    }
-}
-
 /// Creates an invariant for all techniques.
 const fn invariant(name: &'static str, check: fn(&mut Subject) -> Result<(), Violation>) -> Invariant {
     Invariant { name, only: &[], check }
@@ -106,6 +99,18 @@ const MAX_FRAMES: usize = 5000;
 
 /// Distance of a teleport out of any field, metres.
 const ELSEWHERE_M: f64 = 1e9;
+
+/// Returns the invariants that apply to a technique of this name.
+pub fn of_technique(name: &str) -> impl Iterator<Item = &'static Invariant> {
+    INVARIANTS.iter().filter(move |invariant| invariant.only.is_empty() || invariant.only.contains(&name))
+}
+
+impl<'a> Subject<'a> {
+    /// Creates the input for common tolerances ([`TOLERANCES_PX`]).
+    pub fn new(field: &'a Field, technique: &'a mut dyn Technique, views: &'a [(&'static str, View)]) -> Self {
+        Self { field, technique, views, tolerances_px: &TOLERANCES_PX, time_s: 0.0 }
+    }
+}
 
 impl Subject<'_> {
     /// Returns the list of a view once the technique has settled.

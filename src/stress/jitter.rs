@@ -12,8 +12,8 @@ use glam::{DVec2, Mat4, Vec3, Vec4};
 use image::imageops::{FilterType, resize};
 use image::{ImageFormat, Rgb, RgbImage};
 
-use super::Finding;
 use super::fields::hills_at;
+use super::finding::Finding;
 use super::rows::Picture;
 use crate::draw::layout::Frame;
 use crate::draw::place::relative_position;

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use super::case::{Case, Kind, StressTerrain};
 use super::fields::{hills, hills_at, with_views};
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
 use super::invariants::Violation;
-use super::terrain::all_numbers;
-use super::{Case, Finding, Kind, StressTerrain, jitter};
+use super::jitter;
+use super::numbers::all_numbers;
 use crate::bench::paths;
 use crate::draw::DrawList;
 use crate::view::{Metric, Tolerance};

@@ -7,9 +7,12 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use image::ImageFormat;
 
+use super::case::Kind;
+use super::case_run::CaseRun;
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
+use super::image_checker::ImageChecker;
 use super::invariants::Violation;
-use super::{CaseRun, Finding, ImageChecker, Kind};
 use crate::draw::layout::Frame;
 use crate::draw::{DrawList, expand};
 use crate::height::Field;

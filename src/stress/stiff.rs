@@ -11,12 +11,13 @@ use anyhow::{Context, Result};
 use image::{ImageFormat, Rgb, RgbImage};
 use rayon::prelude::*;
 
+use super::case::{Case, Kind};
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
 use super::rows::Picture;
 use super::simulated_loads::{
     COST, EVENT, FixedStep, Load, Proportional, Regulator, SimulatedFrame, constant, overshoot, power, settling, step,
 };
-use super::{Case, Finding, Kind};
 use crate::bench::paths;
 use crate::draw::DrawList;
 use crate::height::save::replace;

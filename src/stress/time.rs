@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use super::case::{Case, Flight, Kind};
 use super::fields::hills;
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
-use super::{Case, Finding, Flight, Kind, views};
+use super::threshold::Threshold;
 use crate::bench::paths::{self, TIME_STEP_S};
 use crate::draw::expand;
 use crate::draw::layout::Frame;
@@ -66,14 +68,11 @@ const CROSSINGS: usize = 12;
 fn oscillation(config: &TechniqueConfig) -> Vec<Finding> {
     let field = Arc::new(terrain());
     let mut technique = (config.entry.build)(Arc::clone(&field), &config.settings);
-    let all = views::views(&field);
-    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a common view").1;
-    let (near, far) = (of("from above a corner"), of("far outside"));
-    let Some([before, behind]) = views::threshold(&field, &mut *technique, near, far.eye) else {
+    let Some(Threshold { start, sides: [before, behind] }) = Threshold::find(&field, &mut *technique) else {
         return vec![Finding::reported("every list is the same", 1.0)];
     };
     // Views just before and behind the threshold, one frame each.
-    let margin = (behind.eye - near.eye) * 1e-9;
+    let margin = (behind.eye - start.eye) * 1e-9;
     let sides = [View { eye: before.eye - margin, ..before }, View { eye: behind.eye + margin, ..behind }];
     let meshes: Vec<_> = (0..=CROSSINGS)
         .map(|k| mesh(&field, &mut *technique, &View { time_s: TIME_STEP_S * k as f64, ..sides[k % 2] }))

@@ -1,96 +1,9 @@
-//! Common views of a field, in which invariants are checked, and extreme ones.
-
-use std::sync::Arc;
+//! Common views of a field, in which invariants are checked.
 
 use glam::{DMat3, DVec3};
 
-use super::fields::hills;
-use super::forms::TechniqueConfig;
-use super::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
-use super::{Case, Finding, Kind, StressTerrain};
 use crate::height::Field;
-use crate::lod::Technique;
 use crate::view::{Aabb, Containment, Lens, Metric, Tolerance, View};
-
-const fn case(name: &'static str, terrain: fn() -> StressTerrain) -> Case {
-    Case { family: "view", name, kind: Kind::Terrain(terrain) }
-}
-
-/// The family `view`. Views straight down, upside down, rolled, orthographic, under the terrain and exactly on a
-/// vertex are common views of every terrain ([`views`]).
-pub const CASES: &[Case] = &[
-    case("every common view", || extreme(|view| view)),
-    case("half a degree wide", || extreme(|view| wide(view, 0.5))),
-    case("170 degrees wide", || extreme(|view| wide(view, 170.0))),
-    case("near plane at 1 mm", || extreme(|view| View { near: 1e-3, ..view })),
-    case("1 x 1 pixels", || extreme(|view| View { size: [1, 1], ..view })),
-    case("16384 x 1 pixels", || extreme(|view| View { size: [16384, 1], ..view })),
-    Case { family: "view", name: "exactly on a threshold", kind: Kind::PerTechnique(on_a_threshold) },
-];
-
-/// The terrain of this family.
-fn terrain() -> Field {
-    hills([129, 97], [10.0; 2], 400.0)
-}
-
-/// Returns the terrain with modified common views.
-fn extreme(change: fn(View) -> View) -> StressTerrain {
-    let field = Arc::new(terrain());
-    StressTerrain { views: views(&field).into_iter().map(|(name, view)| (name, change(view))).collect(), field }
-}
-
-/// Returns a view with another field of view; orthographic views are unchanged.
-fn wide(view: View, degrees: f64) -> View {
-    match view.lens {
-        Lens::Perspective { .. } => View { lens: Lens::Perspective { fov_x: degrees.to_radians() }, ..view },
-        Lens::Orthographic { .. } => view,
-    }
-}
-
-/// Checks every invariant at the two adjacent eye positions between which the list changes, on the way from above a
-/// corner to far away.
-fn on_a_threshold(config: &TechniqueConfig) -> Vec<Finding> {
-    let field = Arc::new(terrain());
-    let mut technique = (config.entry.build)(Arc::clone(&field), &config.settings);
-    let all = views(&field);
-    let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a common view").1;
-    let (near, far) = (of("from above a corner"), of("far outside"));
-    let Some(sides) = threshold(&field, &mut *technique, near, far.eye) else {
-        return vec![Finding::reported("every list is the same", 1.0)];
-    };
-    let views = [("just before", sides[0]), ("just behind", sides[1])];
-    let mut subject = Subject {
-        field: &field,
-        technique: &mut *technique,
-        views: &views,
-        tolerances_px: &TOLERANCES_PX,
-        time_s: 0.0,
-    };
-    let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(config.entry.name));
-    invariants.map(|invariant| Finding::holds(invariant.name, (invariant.check)(&mut subject))).collect()
-}
-
-/// Bisects the path of the eye towards `end` until two adjacent positions (in f64) draw different numbers of
-/// triangles. Returns `None` if both ends draw the same number.
-pub fn threshold(field: &Field, technique: &mut dyn Technique, view: View, end: DVec3) -> Option<[View; 2]> {
-    let mut subject = Subject { field, technique, views: &[], tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
-    let way = end - view.eye;
-    let at = |share: f64| View { eye: view.eye + way * share, ..view };
-    let mut triangles = |share: f64| subject.select(&at(share)).map(|list| list.triangles()).ok();
-    let (mut low, mut high) = (0.0, 1.0);
-    let first = triangles(low)?;
-    if triangles(high)? == first {
-        return None;
-    }
-    while at(low).eye != at(high).eye {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
-        *(if triangles(middle)? == first { &mut low } else { &mut high }) = middle;
-    }
-    Some([at(low), at(high)])
-}
 
 /// Returns the view with another tolerance, pixels, under the certified metric.
 pub fn with_tolerance(view: &View, px: f64) -> View {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 
-use super::Setup;
+use super::setup::Setup;
 use crate::draw::{DrawList, Geometry, Submission};
 use crate::gpu::frame_renderer::{Allowed, DrawSource, FrameInput, FrameRenderer};
 use crate::gpu::passes::hud::{Hud, Painted};

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::Setup;
 use super::bindings::Action;
 use super::camera::{Camera, Motion};
 use super::hud::HudRow;
 use super::renderer::FrameStats;
+use super::setup::Setup;
 use super::site::Site;
 use super::times::Smoothed;
 use crate::lod::budget::{Controller, RANGE_PX, Target};

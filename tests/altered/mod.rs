@@ -1,26 +1,37 @@
-//! Techniques with altered draw lists or requirements, for tests that must notice the difference.
+//! Techniques with altered views, draw lists or requirements, for tests that must notice the difference.
 
+use cuesta::internal::draw::weights::SkirtWeights;
 use cuesta::internal::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::internal::lod::{Entry, Technique, geomipmap};
 use cuesta::internal::view::View;
 
-/// A technique whose draw lists and requirements are changed after the fact.
+/// A technique that is given another view, or whose draw lists or requirements are changed after the fact.
 pub struct Altered {
     inner: Box<dyn Technique>,
-    list: fn(&mut DrawList),
+    view: Box<dyn FnMut(&View) -> View + Send>,
+    list: Box<dyn FnMut(&mut DrawList) + Send>,
     requirements: fn(&mut PipelineRequirements),
 }
 
 impl Altered {
+    /// Changes nothing yet.
+    pub fn new(inner: Box<dyn Technique>) -> Self {
+        Self { inner, view: Box::new(|view| *view), list: Box::new(|_| ()), requirements: |_| () }
+    }
+
+    /// Changes every view before selection.
+    pub fn with_view(self, view: impl FnMut(&View) -> View + Send + 'static) -> Self {
+        Self { view: Box::new(view), ..self }
+    }
+
     /// Changes every draw list.
-    pub fn list(inner: Box<dyn Technique>, list: fn(&mut DrawList)) -> Box<dyn Technique> {
-        Box::new(Self { inner, list, requirements: |_| () })
+    pub fn with_list(self, list: impl FnMut(&mut DrawList) + Send + 'static) -> Self {
+        Self { list: Box::new(list), ..self }
     }
 
     /// Changes the requirements.
-    #[cfg(feature = "vulkan")]
-    pub fn requirements(inner: Box<dyn Technique>, requirements: fn(&mut PipelineRequirements)) -> Box<dyn Technique> {
-        Box::new(Self { inner, list: |_| (), requirements })
+    pub fn with_requirements(self, requirements: fn(&mut PipelineRequirements)) -> Self {
+        Self { requirements, ..self }
     }
 }
 
@@ -32,7 +43,7 @@ impl Technique for Altered {
         self.inner.limits()
     }
     fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.inner.select(view, list);
+        self.inner.select(&(self.view)(view), list);
         (self.list)(list);
     }
     fn keeps_tolerance(&self) -> bool {
@@ -49,11 +60,20 @@ impl Technique for Altered {
 pub static BLOCK_LOST: Entry = Entry {
     name: "block-lost",
     build: |field, settings| {
-        Altered::list((geomipmap::ENTRY.build)(field, settings), |list| {
+        let lose_a_block = |list: &mut DrawList| {
             if let Some(draw) = list.draws.last_mut() {
                 draw.instances.end -= 1;
             }
-        })
+        };
+        Box::new(Altered::new((geomipmap::ENTRY.build)(field, settings)).with_list(lose_a_block))
     },
     ..geomipmap::ENTRY
 };
+
+/// Multiplies the depths of all skirts.
+pub fn scale_skirts(list: &mut DrawList, factor: f32) {
+    for instance in &mut list.instances {
+        let weights = SkirtWeights::of(instance);
+        *instance = instance.with_weights(SkirtWeights { depth_m: factor * weights.depth_m, ..weights });
+    }
+}

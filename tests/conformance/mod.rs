@@ -9,7 +9,7 @@ mod sweep;
 use std::sync::Arc;
 
 use cuesta::internal::lod::TECHNIQUES;
-use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::invariants::{self, INVARIANTS, Subject};
 use cuesta::internal::stress::views;
 use rayon::prelude::*;
 
@@ -25,16 +25,9 @@ fn every_technique_keeps_every_invariant() {
         .flat_map_iter(|&((field_name, field), form)| {
             let views = views::views(field);
             let mut technique = (form.entry.build)(Arc::clone(field), &form.settings);
-            let mut subject = Subject {
-                field,
-                technique: &mut *technique,
-                views: &views,
-                tolerances_px: &TOLERANCES_PX,
-                time_s: 0.0,
-            };
-            let invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(form.entry.name));
-            let failed =
-                invariants.filter_map(move |invariant| Some((invariant.name, (invariant.check)(&mut subject).err()?)));
+            let mut subject = Subject::new(field, &mut *technique, &views);
+            let failed = invariants::of_technique(form.entry.name)
+                .filter_map(move |invariant| Some((invariant.name, (invariant.check)(&mut subject).err()?)));
             failed
                 .map(|(invariant, why)| format!("{invariant}: {} on {field_name}: {why}", form.name))
                 .collect::<Vec<_>>()

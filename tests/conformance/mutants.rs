@@ -11,14 +11,16 @@ use cuesta::internal::draw::{
     Topology,
 };
 use cuesta::internal::height::Field;
+use cuesta::internal::lod::Technique;
 use cuesta::internal::lod::geomipmap::mesh::{BlockMesh, Masks, side};
-use cuesta::internal::lod::{self, Settings, Technique};
 use cuesta::internal::view::{Lens, View};
 
-use cuesta::internal::stress::invariants::{INVARIANTS, Subject, TOLERANCES_PX};
+use cuesta::internal::stress::invariants::{INVARIANTS, Subject};
 use cuesta::internal::stress::views;
 
 use super::cases;
+use crate::altered::{Altered, scale_skirts};
+use crate::prepared::technique;
 
 /// Invariant, mutation, words of the expected message, name of the field, and constructor of the mutant.
 type Mutant = (&'static str, &'static str, &'static str, &'static str, fn(&Arc<Field>) -> Box<dyn Technique>);
@@ -33,13 +35,13 @@ const MUTANTS: &[Mutant] = &[
     ("one surface", "a triangle dropped", "Gap", "real mountains", |field| streamed(field, drop_a_triangle)),
     ("one surface", "a vertex one ulp off", "Crack", "tiled", |field| streamed(field, nudge_a_vertex)),
     ("one surface", "a side one morph step ahead", "Crack", "131 × 67", |field| {
-        Box::new(Changed { seams: Seams::Shared, inner: smooth_tiles(field), change: nudge_a_side })
+        Box::new(Altered::new(technique(field, "smooth-tiles", &["tile=9"])).with_list(nudge_a_side))
     }),
     ("one surface", "too narrow a frustum", "Gap", "131 × 67", |field| in_another_view(field, narrower)),
-    ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| each_depth(list, 0.5))),
+    ("one surface", "skirts half as deep", "Seam", "131 × 67", |field| skirted(field, |list| scale_skirts(list, 0.5))),
     ("one surface", "a side without its skirt", "Seam", "131 × 67", |field| skirted(field, drop_a_skirt)),
     ("one surface", "skirts although sides are shared", "Crack", "131 × 67", |field| {
-        Box::new(Changed { seams: Seams::Shared, inner: clusters(field), change: |_| () })
+        Box::new(Altered::new(clusters(field)).with_requirements(|requirements| requirements.seams = Seams::Shared))
     }),
     ("everything in view is drawn", "a block dropped", "in view and not drawn", "ramp", |field| {
         changed(field, drop_a_block)
@@ -83,8 +85,7 @@ fn mutants_are_detected() {
         let Some((_, field)) = fields.iter().find(|(name, _)| name == field) else { continue };
         let views = views::views(field);
         let mut technique = build(field);
-        let mut subject =
-            Subject { field, technique: &mut *technique, views: &views, tolerances_px: &TOLERANCES_PX, time_s: 0.0 };
+        let mut subject = Subject::new(field, &mut *technique, &views);
         let invariant = INVARIANTS.iter().find(|l| l.name == *invariant).expect("an invariant of the table");
         match (invariant.check)(&mut subject) {
             Ok(()) => panic!("{}: does not detect {mutant}", invariant.name),
@@ -109,13 +110,8 @@ fn unmutated_bases_keep_the_invariants() {
         Blocks::boxed(field, true, &[0, 1]),
     ];
     for mut technique in whole {
-        let mut subject = Subject {
-            field,
-            technique: &mut *technique,
-            views: &views::views(field),
-            tolerances_px: &TOLERANCES_PX,
-            time_s: 0.0,
-        };
+        let views = views::views(field);
+        let mut subject = Subject::new(field, &mut *technique, &views);
         // Clusters may have blocks of several levels.
         let has_levels = subject.technique.pipeline_requirements().seams == Seams::Shared;
         for invariant in
@@ -127,33 +123,20 @@ fn unmutated_bases_keep_the_invariants() {
 }
 
 fn geomipmap(field: &Arc<Field>) -> Box<dyn Technique> {
-    let entry = lod::find("geomipmap").expect("a row of the table");
-    let settings = Settings::new(entry, None, &[("block".into(), "17".into())]).expect("a block's size");
-    (entry.build)(Arc::clone(field), &settings)
-}
-
-/// A technique with its lists changed.
-struct Changed {
-    seams: Seams,
-    inner: Box<dyn Technique>,
-    change: fn(&mut DrawList),
-}
-
-fn changed(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
-    Box::new(Changed { seams: Seams::Shared, inner: geomipmap(field), change })
+    technique(field, "geomipmap", &["block=17"])
 }
 
 /// Clusters with skirts.
 fn clusters(field: &Arc<Field>) -> Box<dyn Technique> {
-    let entry = lod::find("clusters").expect("a row of the table");
-    let choices = [("block", "8"), ("seams", "skirts"), ("morph", "on")].map(|(key, word)| (key.into(), word.into()));
-    (entry.build)(Arc::clone(field), &Settings::new(entry, None, &choices).expect("the table's own values"))
+    technique(field, "clusters", &["block=8", "seams=skirts", "morph=on"])
 }
 
-fn smooth_tiles(field: &Arc<Field>) -> Box<dyn Technique> {
-    let entry = lod::find("smooth-tiles").expect("a row of the table");
-    let settings = Settings::new(entry, None, &[("tile".into(), "9".into())]).expect("a tile's size");
-    (entry.build)(Arc::clone(field), &settings)
+fn changed(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
+    Box::new(Altered::new(geomipmap(field)).with_list(change))
+}
+
+fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
+    Box::new(Altered::new(clusters(field)).with_list(change))
 }
 
 /// Adds one step of a morph to the last sides of the tile in the middle of the list.
@@ -165,17 +148,6 @@ fn nudge_a_side(list: &mut DrawList) {
     });
 }
 
-fn skirted(field: &Arc<Field>, change: fn(&mut DrawList)) -> Box<dyn Technique> {
-    Box::new(Changed { seams: Seams::Skirts, inner: clusters(field), change })
-}
-
-fn each_depth(list: &mut DrawList, factor: f32) {
-    for instance in &mut list.instances {
-        let weights = SkirtWeights::of(instance);
-        *instance = instance.with_weights(SkirtWeights { depth_m: factor * weights.depth_m, ..weights });
-    }
-}
-
 /// Removes the bit of the first skirt in a list.
 fn drop_a_skirt(list: &mut DrawList) {
     let skirted = list.instances.iter_mut().find(|instance| SkirtWeights::of(instance).sides != 0);
@@ -183,29 +155,6 @@ fn drop_a_skirt(list: &mut DrawList) {
         let weights = SkirtWeights::of(instance);
         *instance = instance.with_weights(SkirtWeights { sides: weights.sides & (weights.sides - 1), ..weights });
     });
-}
-
-impl Technique for Changed {
-    fn resident(&self) -> &Geometry {
-        self.inner.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.inner.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.inner.select(view, list);
-        (self.change)(list);
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        PipelineRequirements {
-            draws: self.inner.pipeline_requirements().draws,
-            seams: self.seams,
-            ..PipelineRequirements::default()
-        }
-    }
-    fn keeps_tolerance(&self) -> bool {
-        true
-    }
 }
 
 /// Removes the last block from all draws; the draws of one level's borders and centre share blocks.
@@ -306,29 +255,9 @@ fn nudge_a_vertex(geometry: &mut Geometry) {
 }
 
 /// Geomipmap that receives another view than the list is for. `count` is passed to the function that changes the view.
-struct InAnotherView {
-    inner: Box<dyn Technique>,
-    view: fn(&View, &mut u32) -> View,
-    count: u32,
-}
-
 fn in_another_view(field: &Arc<Field>, view: fn(&View, &mut u32) -> View) -> Box<dyn Technique> {
-    Box::new(InAnotherView { inner: geomipmap(field), view, count: 0 })
-}
-
-impl Technique for InAnotherView {
-    fn resident(&self) -> &Geometry {
-        self.inner.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.inner.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.inner.select(&(self.view)(view, &mut self.count), list);
-    }
-    fn keeps_tolerance(&self) -> bool {
-        true
-    }
+    let mut count = 0;
+    Box::new(Altered::new(geomipmap(field)).with_view(move |seen| view(seen, &mut count)))
 }
 
 fn narrower(view: &View, _: &mut u32) -> View {

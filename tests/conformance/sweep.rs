@@ -12,14 +12,15 @@ use std::time::Instant;
 use cuesta::internal::cli::whole::Whole;
 use cuesta::internal::draw::DrawList;
 use cuesta::internal::height::{self, Field, Options, synth};
-use cuesta::internal::lod::{self, Settings};
+use cuesta::internal::lod::{self, TECHNIQUES};
 use cuesta::internal::stress::invariants::{INVARIANTS, Subject};
-use cuesta::internal::stress::sweep::{self, SweepCase, random, shrink};
+use cuesta::internal::stress::sweep::{self, Failure, SweepCase, random, shrink};
 use cuesta::internal::stress::views;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use rayon::prelude::*;
 
 use crate::altered::BLOCK_LOST;
+use crate::prepared::technique;
 
 /// Default number of cases: about two minutes on two cores.
 const CASES: u64 = 9000;
@@ -30,20 +31,23 @@ fn set<T: FromStr>(key: &str) -> Option<T> {
     Some(value.parse().unwrap_or_else(|_| panic!("{key}={value}: invalid value")))
 }
 
+/// Checks a case with its own technique.
+fn check(case: &SweepCase) -> Result<(), Box<Failure>> {
+    case.check(lod::find(&case.technique).expect("a technique"))
+}
+
 #[test]
 fn random_cases_keep_every_invariant() {
     if let Some(case) = set::<SweepCase>("SWEEP_CASE") {
-        case.check().unwrap_or_else(|failure| panic!("{failure}"));
+        check(&case).unwrap_or_else(|failure| panic!("{failure}"));
         return;
     }
     let (cases, seed) = (set("SWEEP_CASES").unwrap_or(CASES), set("SWEEP_SEED").unwrap_or(SEED));
     let entry = set::<String>("SWEEP_TECHNIQUE").map(|name| lod::find(&name).expect("a technique"));
-    let case = |number| match entry {
-        Some(entry) => random::case(seed, number, entry, None),
-        None => random::any(seed, number),
-    };
+    let entry_of = |number: u64| entry.unwrap_or(&TECHNIQUES[(number % TECHNIQUES.len() as u64) as usize]);
+    let case = |number| random::case(seed, number, entry_of(number), None);
     let start = Instant::now();
-    let failures = sweep::run((0..cases).into_par_iter().map(case));
+    let failures = sweep::run((0..cases).into_par_iter().map(case), check);
     let minutes = start.elapsed().as_secs_f64() / 60.0;
     println!("{cases} cases, {:.0} a minute, {} fail", cases as f64 / minutes, failures.len());
     let few: Vec<_> = failures.iter().take(8).map(ToString::to_string).collect();
@@ -72,23 +76,20 @@ fn coarse_triangles_reach_the_edge_of_any_field() {
         (synthetic("flat", [226, 70], 3), &[0.7]),
         (real("gabilan_lidar1m_921x859_f32_cog_deflate_pred3.tif"), &[1.0, 2.0, 3.0, 4.0]),
     ];
-    let forms: [&[(&str, &str)]; 3] = [&[], &[("morph", "on"), ("hold", "on")], &[("patches", "resident")]];
+    let forms: [&[&str]; 3] = [&[], &["morph=on", "hold=on"], &["patches=resident"]];
     fields.par_iter().for_each(|((name, field), tolerances_px)| {
         let Some(field) = field else { return };
         let is_large = field.size().iter().product::<u32>() > 100_000;
         let near = views::views(field).into_iter().filter(|(name, _)| !is_large || FEW_VIEWS.contains(name));
         let views: Vec<_> = near.chain([("all of it", default_view(field))]).collect();
         for form in forms {
-            let choices: Vec<_> = form.iter().map(|(key, word)| (key.to_string(), word.to_string())).collect();
-            let entry = lod::find("sphere-tree").expect("a row of the table");
-            let settings = Settings::new(entry, None, &choices).expect("the table's own words");
-            let mut technique = (entry.build)(Arc::clone(field), &settings);
+            let mut technique = technique(field, "sphere-tree", form);
             let under = |view: &(&'static str, View)| {
                 let (name, view) = *view;
                 tolerances_px.iter().map(move |&px| (name, views::with_tolerance(&view, px)))
             };
             let views: Vec<_> = views.iter().flat_map(under).collect();
-            let mut subject = Subject { field, technique: &mut *technique, views: &views, tolerances_px, time_s: 0.0 };
+            let mut subject = Subject { tolerances_px, ..Subject::new(field, &mut *technique, &views) };
             for invariant in INVARIANTS.iter().filter(|invariant| OF_COVERAGE.contains(&invariant.name)) {
                 (invariant.check)(&mut subject)
                     .unwrap_or_else(|why| panic!("{}: {name}, {form:?}: {why}", invariant.name));
@@ -133,7 +134,7 @@ const FOUND: [&str; 6] = [
 fn past_failures_stay_fixed() {
     for line in FOUND {
         let case: SweepCase = line.parse().expect("a case");
-        case.check().unwrap_or_else(|failure| panic!("{failure}"));
+        check(&case).unwrap_or_else(|failure| panic!("{failure}"));
     }
 }
 
@@ -142,8 +143,7 @@ fn past_failures_stay_fixed() {
 fn flat_fields_take_few_triangles() {
     for (size, max) in [([226, 70], 15), ([921, 859], 139), ([129, 129], 2), ([20, 31], 2), ([1300, 2], 22)] {
         let field = Arc::new(synth::synth(synth::Kind::Flat, size, 3));
-        let entry = lod::find("sphere-tree").expect("a row of the table");
-        let mut technique = (entry.build)(Arc::clone(&field), &Settings::defaults(entry));
+        let mut technique = technique(&field, "sphere-tree", &[]);
         let mut list = DrawList::default();
         technique.select(&default_view(&field), &mut list);
         println!("{size:?}: {} triangles", list.triangles());
@@ -154,9 +154,9 @@ fn flat_fields_take_few_triangles() {
 #[test]
 fn broken_techniques_are_detected_and_shrunk() {
     let case = |number| random::case(SEED, number, &BLOCK_LOST, None);
-    let failures: Vec<_> = (0..20).filter_map(|number| case(number).check_with(&BLOCK_LOST).err()).collect();
+    let failures: Vec<_> = (0..20).filter_map(|number| case(number).check(&BLOCK_LOST).err()).collect();
     assert!(failures.len() > 5, "{} of 20 cases fail", failures.len());
-    let shrunk = shrink::shrink(*failures[0].clone(), |case| case.check_with(&BLOCK_LOST));
+    let shrunk = shrink::shrink(*failures[0].clone(), |case| case.check(&BLOCK_LOST));
     let SweepCase { terrain, settings, .. } = &shrunk.case;
     assert_eq!((terrain.kind.as_str(), terrain.size), ("flat", [2, 2]), "{shrunk}");
     assert!(settings.is_empty() && shrunk.invariant == "one surface", "{shrunk}");

@@ -22,8 +22,7 @@ pub fn drawn(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) 
     })
 }
 
-/// Runs all measurements with device memory of their own: shading-only baseline, capture, error pass, probe and
-/// reference image.
+/// Runs all measurements with device memory of their own: shading-only baseline, capture, probe and reference image.
 pub fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Technique) -> Result<()> {
     with_scene(gpu, field, technique, |scene, technique| {
         let view = aslant(field, [64, 40], 2.0);
@@ -32,7 +31,6 @@ pub fn measured(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &mut dyn Techniqu
         renderer.complete()?;
         renderer.draw_shading_only(&view, Copy::Picture)?;
         renderer.capture(technique, &view)?;
-        renderer.errors(technique, &view)?;
         renderer.draw_probed(technique, "probed", &view)?;
         Truth::new(scene, &view).map(|_| ())
     })

@@ -28,11 +28,13 @@ use std::sync::Arc;
 
 use cuesta::internal::gpu::{Choice, Gpu, Instance};
 use cuesta::internal::height::{Field, Holes, Samples, synth};
-use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::lod::Technique;
 use cuesta::internal::plan::{Look, ScenePlan};
 use cuesta::internal::scene::{RenderResult, Scene};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
+
+use crate::prepared::technique;
 
 /// Runs a test on a device under validation.
 pub(crate) fn on_device(test: impl FnOnce(&Arc<Gpu>)) {
@@ -55,15 +57,6 @@ fn on_device_with(layers: bool, test: impl FnOnce(&Arc<Gpu>)) {
             println!("skipped: no Vulkan device, or no validation layers: {error:#}");
         }
     }
-}
-
-/// A technique with settings given as `key=value`.
-pub(crate) fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
-    let (name, variant) = name.split_once(':').map_or((name, None), |(n, v)| (n, Some(v)));
-    let entry = lod::find(name).expect("in the table");
-    let settings: Vec<_> =
-        settings.iter().map(|s| s.split_once('=').unwrap()).map(|(k, v)| (k.to_string(), v.to_string())).collect();
-    (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).unwrap())
 }
 
 /// Renders a field with a plan.

@@ -28,7 +28,7 @@ pub(super) fn renderer(gpu: &Arc<Gpu>, field: &Arc<Field>, technique: &dyn Techn
 
 /// A technique's lists drawn without a depth buffer.
 fn painted(technique: Box<dyn Technique>) -> Box<dyn Technique> {
-    Altered::requirements(technique, |requirements| requirements.depth_mode = DepthMode::Painter)
+    Box::new(Altered::new(technique).with_requirements(|requirements| requirements.depth_mode = DepthMode::Painter))
 }
 
 /// Returns the bytes of all depth buffers.

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use cuesta::internal::draw::weights::SkirtWeights;
-use cuesta::internal::draw::{DrawList, Geometry, Limits, PipelineRequirements};
 use cuesta::internal::gpu::Gpu;
 use cuesta::internal::height::{Field, synth};
 use cuesta::internal::lod::Technique;
@@ -14,38 +12,13 @@ use cuesta::internal::stress::views;
 use cuesta::internal::view::View;
 
 use super::{aslant, difference, on_device, render, technique};
+use crate::altered::{Altered, scale_skirts};
 use crate::conformance::cases;
 
 /// Clusters with skirts `factor` times as deep.
-struct Deeper {
-    inner: Box<dyn Technique>,
-    factor: f32,
-}
-
-impl Technique for Deeper {
-    fn resident(&self) -> &Geometry {
-        self.inner.resident()
-    }
-    fn limits(&self) -> Limits {
-        self.inner.limits()
-    }
-    fn select(&mut self, view: &View, list: &mut DrawList) {
-        self.inner.select(view, list);
-        for instance in &mut list.instances {
-            let weights = SkirtWeights::of(instance);
-            *instance = instance.with_weights(SkirtWeights { depth_m: self.factor * weights.depth_m, ..weights });
-        }
-    }
-    fn keeps_tolerance(&self) -> bool {
-        self.inner.keeps_tolerance()
-    }
-    fn pipeline_requirements(&self) -> PipelineRequirements {
-        self.inner.pipeline_requirements()
-    }
-}
-
-fn skirted(field: &Arc<Field>, morph: &str, factor: f32) -> Deeper {
-    Deeper { inner: technique(field, "clusters", &["block=8", morph, "seams=skirts"]), factor }
+fn skirted(field: &Arc<Field>, morph: &str, factor: f32) -> Altered {
+    let clusters = technique(field, "clusters", &["block=8", morph, "seams=skirts"]);
+    Altered::new(clusters).with_list(move |list| scale_skirts(list, factor))
 }
 
 /// Returns the number of pixels where sky shows through terrain.

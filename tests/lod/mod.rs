@@ -17,23 +17,13 @@ mod strips_far;
 mod strips_guard;
 mod strips_order;
 
-use std::sync::Arc;
-
 use cuesta::internal::draw::expand;
 use cuesta::internal::draw::layout::Frame;
 use cuesta::internal::draw::{DrawList, Geometry};
 use cuesta::internal::height::{Field, surface};
-use cuesta::internal::lod::{self, Settings, Technique};
 use cuesta::internal::view::View;
 
-/// Builds a technique, or a variant given as `technique:variant`, with settings given as `key=value`.
-fn technique(field: &Arc<Field>, name: &str, settings: &[&str]) -> Box<dyn Technique> {
-    let (name, variant) = name.split_once(':').map_or((name, None), |(name, variant)| (name, Some(variant)));
-    let entry = lod::find(name).expect("in the table");
-    let pair = |s: &&str| s.split_once('=').map(|(k, v)| (k.to_string(), v.to_string())).expect("key=value");
-    let settings: Vec<_> = settings.iter().map(pair).collect();
-    (entry.build)(Arc::clone(field), &Settings::new(entry, variant, &settings).expect("the table's own values"))
-}
+use crate::prepared::technique;
 
 /// Returns the drawn height at every sample, the higher one if one edge lies above another; NaN if nothing is drawn
 /// there.

@@ -5,9 +5,10 @@ use cuesta::internal::height::surface::Corner;
 use cuesta::internal::height::{Field, Holes, Samples};
 use cuesta::internal::lod::sorted_strips::blend::Blend;
 use cuesta::internal::lod::sorted_strips::context::WalkContext;
-use cuesta::internal::lod::sorted_strips::pages::{Grid, Pages, TraversalDirection};
+use cuesta::internal::lod::sorted_strips::pages::{Grid, Pages, Row, TraversalDirection};
 use cuesta::internal::lod::sorted_strips::shapes::Shapes;
 use cuesta::internal::lod::sorted_strips::splits::{Levels, Splits};
+use cuesta::internal::lod::sorted_strips::walk::Worker;
 use cuesta::internal::measure::watertight;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
@@ -82,7 +83,13 @@ impl Scene {
             traversal: self.traversal,
             blend: Blend::Off,
         };
-        let streams = self.pages.rows(&self.traversal).into_iter().map(|row| context.walk(&row));
+        let walked = |row: &Row| {
+            let mut worker = Worker::default();
+            context.walk_on(row, &mut worker);
+            worker.stream
+        };
+        let rows = self.pages.rows(&self.traversal);
+        let streams = rows.iter().map(walked);
         streams
             .flat_map(|stream| {
                 let corner = |k: u32| match stream.vertices.get(k as usize) {
@@ -126,7 +133,7 @@ fn random_level_functions_are_watertight() {
         .map(|seed| {
             let scene = Scene::random(seed, true);
             let triangles = scene.triangles();
-            let proof = watertight::prove(&scene.field, &frustum, &triangles)
+            let proof = watertight::prove(&scene.field, &frustum, &triangles, 0)
                 .unwrap_or_else(|why| panic!("seed {seed}, {:?}, {:?}: {why}", scene.pages.grid, scene.traversal));
             assert_eq!(proof.doubled_area, scene.doubled_area(), "seed {seed}");
             (proof.triangles, (1..7).filter(|&l| is_any_split(&scene, l)).count())
@@ -144,7 +151,7 @@ fn unclosed_level_functions_are_detected() {
     let (mut open_ones, mut detected) = (0, 0);
     for seed in 0..400u64 {
         let [open, closed] = [false, true].map(|closed| Scene::random(seed, closed));
-        let proof = watertight::prove(&open.field, &frustum, &open.triangles());
+        let proof = watertight::prove(&open.field, &frustum, &open.triangles(), 0);
         let is_whole = proof.is_ok_and(|proof| proof.doubled_area == open.doubled_area());
         let closed = open.splits.count() == closed.splits.count();
         assert!(!closed || is_whole, "seed {seed}: closed, and no surface");

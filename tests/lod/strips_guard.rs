@@ -32,7 +32,7 @@ fn rotate(guard: &str, lens: Lens, degrees: f64) -> (f64, u64) {
         if let Some((from, old)) = &before {
             let state = |view, list| pop::State { view, resident: strips.resident(), list };
             let found = pop::pop(&field, state(from, old), state(&view, &list));
-            assert!(found.histogram.total() > 1000, "land is seen twice");
+            assert!(found.histogram.bins.iter().map(|bin| bin.count).sum::<u64>() > 1000, "land is seen twice");
             largest_px = largest_px.max(found.max_px);
         }
         before = Some((view, list));

@@ -14,7 +14,7 @@ fn largest(metric: Metric) -> [f64; ANGLES] {
     let mut field = synth::synth(Kind::Fractal, [257, 257], 5);
     field.spacing = [20.0, 20.0];
     let field = Arc::new(field);
-    let mut technique = technique(&field, "geomipmap", &[("block", "9")]);
+    let mut technique = technique(&field, "geomipmap", &["block=9"]);
     let mut largest = [0.0f64; ANGLES];
     for k in 0..48 {
         let view = View {

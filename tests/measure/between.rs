@@ -43,7 +43,7 @@ fn in_parts(list: &DrawList) -> DrawList {
 fn told_in_parts_of_samples_the_same_list_measures_the_same() {
     let field = terrain();
     let views = [8.0, 9.0].map(|x| view(&field, x));
-    let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10")]);
+    let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=10"]);
     let lists = views.each_ref().map(|view| select(&mut *strips, view));
     let finer = lists.each_ref().map(in_parts);
     let resident = strips.resident();
@@ -77,11 +77,11 @@ fn corner_at(triangle: &Drawn, at: [i32; 2]) -> Option<usize> {
 fn faults_of_parts_of_a_sample_are_found() {
     let field = terrain();
     let view = view(&field, 8.0);
-    let mut strips = technique(&field, "sorted-strips", &[("level", "uniform"), ("edge", "10"), ("blend", "end")]);
+    let mut strips = technique(&field, "sorted-strips", &["level=uniform", "edge=10", "blend=end"]);
     let list = select(&mut *strips, &view);
     let triangles = drawn(&field, &view, &*strips, &list);
     let prove = |triangles: &[Drawn]| {
-        watertight::prove_between(&field, &view.frustum(), triangles, list.fraction_bits).map_err(|why| why.kind)
+        watertight::prove(&field, &view.frustum(), triangles, list.fraction_bits).map_err(|why| why.kind)
     };
     prove(&triangles).unwrap();
     let mut found = Vec::new();
@@ -126,9 +126,9 @@ fn a_junction_between_samples_is_found() {
     let (a, b, c, d) = (corner(0, 0), corner(0, last_z), corner(last_x, last_z), corner(last_x, 0));
     let drawn = |corners| Drawn { corners, instance: 0 };
     let whole = [[a, b, c], [a, c, d]].map(drawn);
-    let proof = watertight::prove_between(&field, &view.frustum(), &whole, 6).unwrap();
+    let proof = watertight::prove(&field, &view.frustum(), &whole, 6).unwrap();
     assert_eq!(proof.doubled_area, 2 * 200 * 169);
     let cut = [[a, b, c], [a, inner, d], [inner, c, d]].map(drawn);
-    let found = watertight::prove_between(&field, &view.frustum(), &cut, 6).unwrap_err();
+    let found = watertight::prove(&field, &view.frustum(), &cut, 6).unwrap_err();
     assert_eq!(found.kind, Kind::TJunction, "{found}");
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use cuesta::internal::draw::expand::Drawn;
 use cuesta::internal::height::surface::{Corner, doubled_area};
 use cuesta::internal::height::{Field, demo, synth};
-use cuesta::internal::measure::watertight::{self, CounterExample, Kind, plan};
+use cuesta::internal::measure::watertight::{self, CounterExample, Kind};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
-use super::{drawn, select, technique};
+use super::{drawn, plan, select, technique};
 
 struct Scene {
     field: Arc<Field>,
@@ -31,7 +31,7 @@ fn scene() -> Scene {
         tolerance: Tolerance { px: 20.0, metric: Metric::Certified },
         time_s: 0.0,
     };
-    let mut technique = technique(&field, "geomipmap", &[("block", "17")]);
+    let mut technique = technique(&field, "geomipmap", &["block=17"]);
     let list = select(&mut *technique, &view);
     assert!(list.levels().iter().filter(|&&n| n > 0).count() >= 3, "levels {:?}", list.levels());
     let triangles = drawn(&field, &view, &*technique, &list);
@@ -40,7 +40,7 @@ fn scene() -> Scene {
 
 impl Scene {
     fn prove(&self, triangles: &[Drawn]) -> Result<watertight::Proof, Box<CounterExample>> {
-        watertight::prove(&self.field, &self.view.frustum(), triangles)
+        watertight::prove(&self.field, &self.view.frustum(), triangles, 0)
     }
 
     /// The fault of the triangles, which is where it was planted and can be written and drawn.

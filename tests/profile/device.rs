@@ -14,7 +14,8 @@ use cuesta::internal::scene::{Copy, Scene, SceneRenderer};
 use cuesta::internal::view::View;
 
 use super::trace_format::{self, Slice};
-use crate::gpu::{aslant, mountains, on_device, technique};
+use crate::gpu::{aslant, mountains, on_device};
+use crate::prepared::technique;
 
 /// Makes a scene of a field and lends it.
 fn with_scene<T>(gpu: &Arc<Gpu>, field: &Arc<Field>, f: impl FnOnce(&Scene) -> T) -> T {

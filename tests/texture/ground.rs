@@ -5,11 +5,13 @@ use std::sync::Arc;
 use cuesta::internal::draw::{DrawList, Geometry};
 use cuesta::internal::height::Field;
 use cuesta::internal::height::synth::{Kind, synth};
-use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::lod::Technique;
 use cuesta::internal::texture::virtual_ground::{VirtualGround, VirtualGroundLayout};
 use cuesta::internal::texture::virtual_overlay::VirtualTextureStats;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
+
+use crate::prepared;
 
 const SIZE: [u32; 2] = [640, 360];
 
@@ -18,8 +20,7 @@ fn field() -> Arc<Field> {
 }
 
 fn technique(field: &Arc<Field>) -> Box<dyn Technique> {
-    let entry = lod::find("sphere-tree").expect("in the table");
-    (entry.build)(Arc::clone(field), &Settings::defaults(entry))
+    prepared::technique(field, "sphere-tree", &[])
 }
 
 /// A view from 3 m above a position in samples.

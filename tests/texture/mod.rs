@@ -10,7 +10,7 @@ use cuesta::internal::draw::expand::{self, Drawn};
 use cuesta::internal::draw::layout::Frame;
 use cuesta::internal::height::synth::{self, Kind};
 use cuesta::internal::height::{Field, surface};
-use cuesta::internal::lod::{self, Settings, Technique};
+use cuesta::internal::lod::Technique;
 use cuesta::internal::texture::hidden::Depths;
 use cuesta::internal::texture::mip_spheres::MipSpheres;
 use cuesta::internal::texture::pieces::{ClipPlanes, Clipper, Corner};
@@ -19,6 +19,8 @@ use cuesta::internal::texture::wedges;
 use cuesta::internal::texture::working_set::{Stop, Wedge, WorkingSet};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
+
+use crate::prepared::technique;
 
 /// Cells along a side of the field and of its root square.
 const CELLS: i32 = 1024;
@@ -60,9 +62,7 @@ impl Flight {
         let mut field = synth::synth(Kind::Eroded, [CELLS as u32 + 1; 2], 7);
         field.spacing = [SPACING_M; 2];
         let field = Arc::new(field);
-        let entry = lod::find("sphere-tree").expect("in the table");
-        let technique = (entry.build)(Arc::clone(&field), &Settings::defaults(entry));
-        Self { field, technique }
+        Self { technique: technique(&field, "sphere-tree", &[]), field }
     }
 
     fn view(&self, frame: usize, px: f64) -> View {

@@ -60,7 +60,7 @@ pub struct Capture {
     bindings: Bindings,
     pipelines: BTreeMap<(Source, Topology), vk::Pipeline>,
     /// The records: an array of [`Captured`].
-    pub buffer: Buffer,
+    buffer: Buffer,
 }
 
 impl Capture {
@@ -179,8 +179,7 @@ impl Pass for Batch<'_> {
         }
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         let written = (Stage::VERTEX_SHADER, Access::SHADER_STORAGE_WRITE);
-        let read = (Stage::HOST | Stage::COMPUTE_SHADER, Access::HOST_READ | Access::SHADER_STORAGE_READ);
-        memory_barrier(r.gpu, commands, written, read);
+        memory_barrier(r.gpu, commands, written, (Stage::HOST, Access::HOST_READ));
         Ok(())
     }
 }

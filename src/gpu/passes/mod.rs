@@ -5,7 +5,6 @@
 //! rendering begins and ends, the barriers between passes, and the images that post-processing reads.
 
 pub mod capture;
-pub mod error_pass;
 pub(super) mod fullscreen;
 #[cfg(feature = "viewer")]
 pub mod hud;
@@ -30,7 +29,6 @@ pub static PASSES: &[&Row] = &[
     #[cfg(feature = "viewer")]
     &hud::ROW,
     &capture::ROW,
-    &error_pass::ROW,
 ];
 
 #[cfg(test)]

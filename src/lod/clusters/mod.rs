@@ -46,9 +46,10 @@ use self::refine::Refinement;
 use self::skirts::Skirts;
 use self::states::{MAX_SEEDS, Seeds};
 use self::tree::Tree;
-use super::{
-    Diagnostics, Entry, Need, SelectOnGpu, Setting, Settings, Technique, Values, Variant, select_within_limits,
-};
+use super::entry::{Entry, Variant};
+use super::settings::{Need, Setting, Settings, Values};
+use super::technique::{Diagnostics, SelectOnGpu, Technique};
+use super::within_limits::select_within_limits;
 use crate::draw::{
     Draw, DrawList, Geometry, GpuSelection, Instance, Limits, Morph, PipelineRequirements, Seams, Source, Submission,
     Topology,

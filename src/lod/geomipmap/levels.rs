@@ -1,8 +1,11 @@
 //! Chooses the level of each block in a view, and brings neighbours within one level of each other.
 
-use super::MORPH_RATIO;
 use super::blocks::Blocks;
 use crate::view::View;
+
+/// End of the morph band: a block starts to morph where the allowed error reaches that of the morph to the next level,
+/// and has morphed at this multiple of it. A wider band draws finer levels for longer, a narrower one is noticeable.
+const MORPH_RATIO: f64 = 1.3;
 
 /// Rule for the level of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,17 +28,15 @@ use std::sync::Arc;
 use self::blocks::Blocks;
 use self::levels::{Distance, ONE};
 use self::mesh::{BlockMesh, Masks, side};
-use super::{Diagnostics, Entry, Need, Omitted, Setting, Settings, Technique, Values, Variant};
+use super::entry::{Entry, Variant};
+use super::settings::{Need, Setting, Settings, Values};
+use super::technique::{Diagnostics, Omitted, Technique};
 use crate::draw::{
     Draw, DrawList, Geometry, Instance, Limits, Morph, PipelineRequirements, Source, Submission, Topology,
     weights::{self, SlotWeights},
 };
 use crate::height::{Field, MAX_SIDE};
 use crate::view::View;
-
-/// End of the morph band: a block starts to morph where the allowed error reaches that of the morph to the next level,
-/// and has morphed at this multiple of it. A wider band draws finer levels for longer, a narrower one is noticeable.
-const MORPH_RATIO: f64 = 1.3;
 
 /// Row of [`super::TECHNIQUES`].
 pub const ENTRY: Entry = Entry {

@@ -43,7 +43,10 @@ use self::levels::ONE;
 use self::pattern::Patterns;
 use self::queue::{Budget, Queue};
 use self::tiles::Tiles;
-use super::{Diagnostics, Entry, Gradual, Need, Omitted, Setting, Settings, Technique, Values, select_within_limits};
+use super::entry::Entry;
+use super::settings::{Need, Setting, Settings, Values};
+use super::technique::{Diagnostics, Gradual, Omitted, Technique};
+use super::within_limits::select_within_limits;
 use crate::draw::{
     Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, Normals, PipelineRequirements, Source,
     Topology, Upload, VertexNormals,

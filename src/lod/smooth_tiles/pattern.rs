@@ -1,13 +1,12 @@
 //! Builds the triangles of a tile at each level as indices into its chunk: the centre, and a border for each set of
 //! sides that meet a coarser tile. Vertices of a chunk are numbered row by row.
+//!
+//! Sides of a tile are numbered: x = 0, z = 0, x = last, z = last. Side q meets side `(q + 2) % 4` of the neighbour
+//! (Larsen & Christensen, figure 8).
 
 use std::ops::Range;
 
 use crate::height::rtin;
-
-/// Number of sides of a tile: x = 0, z = 0, x = last, z = last. Side q meets side `(q + 2) % 4` of the neighbour
-/// (Larsen & Christensen, figure 8).
-pub const SIDES: usize = 4;
 
 /// A triangle as grid coordinates (x, z) of a level.
 pub type Triangle = [[i32; 2]; 3];
@@ -147,7 +146,7 @@ mod tests {
         for (n, mask) in [2, 4, 8].into_iter().flat_map(|n| (0..16).map(move |mask| (n, mask))) {
             let border = border(n, mask);
             assert_eq!(doubled_area(&border) + doubled_area(&centre(n)), 2 * n * n, "{n} {mask}");
-            for (side, k) in (0..SIDES).flat_map(|side| (1..n).step_by(2).map(move |k| (side, k))) {
+            for (side, k) in (0..4).flat_map(|side| (1..n).step_by(2).map(move |k| (side, k))) {
                 let vertex = [[0, k], [k, 0], [n, k], [k, n]][side];
                 let is_there = border.iter().flatten().any(|v| *v == vertex);
                 assert_eq!(is_there, mask >> side & 1 == 0, "{n} {mask} {vertex:?}");

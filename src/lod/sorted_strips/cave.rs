@@ -22,19 +22,19 @@ use super::certified::{Certified, bounds, guarded};
 use super::context::WalkContext;
 use super::footprint::Footprint;
 use super::measure::Errors;
-use super::pages::{Grid, Pages, Row, TraversalDirection};
+use super::pages::{Grid, MAX_PAGES, Pages, Row, TraversalDirection};
 use super::sequence::Sequence;
 use super::shapes::Shapes;
 use super::splits::Splits;
+use super::stream::{self, MAX_TRIANGLES, Stream};
 use super::topology;
-use super::walk::{Stream, Worker};
-use super::{ENTRY, MAX_PAGES, MAX_TRIANGLES, join_streams};
-use crate::draw::{
-    Draw, DrawKinds, DrawList, ExplicitVertex, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
-};
+use super::walk::Worker;
+use crate::draw::{DrawKinds, DrawList, ExplicitVertex, Geometry, Limits, PipelineRequirements, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
-use crate::lod::{Diagnostics, Settings, Technique, select_within_limits};
+use crate::lod::settings::Settings;
+use crate::lod::technique::{Diagnostics, Technique};
+use crate::lod::within_limits::select_within_limits;
 use crate::view::{Containment, Lens, View};
 
 /// Sorted strips over a floor and a ceiling.
@@ -59,14 +59,11 @@ pub struct CaveStrips {
     empty: Geometry,
 }
 
-/// Checks that a technique with these settings draws caves.
+/// Checks that sorted strips with these settings draw caves.
 ///
 /// # Errors
 /// Returns one line that states the expected setting.
-pub fn can_draw(technique: &str, settings: &Settings) -> Result<(), String> {
-    if technique != ENTRY.name {
-        return Err(format!("a ceiling: expected technique {}, found {technique}", ENTRY.name));
-    }
+pub fn can_draw(settings: &Settings) -> Result<(), String> {
     if settings.word("order") == "painter" {
         return Err(
             "a ceiling: expected order=front, back or shuffled, found order=painter: it needs depth".to_string()
@@ -160,16 +157,9 @@ impl CaveStrips {
 
     fn fill(&self, rows: usize, list: &mut DrawList) {
         let streams: Vec<&Stream> = self.rows[..rows].iter().map(|row| &row.pairs.stream).collect();
-        join_streams(&streams, &mut list.streamed);
-        let [mut first, mut first_vertex] = [0; 2];
-        for (batch, stream) in (0u32..).zip(&streams) {
-            list.instances.push(Instance { batch, ..Instance::default() });
-            let (source, topology) = (Source::Streamed, Topology::Triangles);
-            let (indices, instances) = (first..first + stream.indices.len() as u32, batch..batch + 1);
-            first = indices.end;
-            list.draws.push(Draw { source, topology, indices, instances, first_vertex });
-            first_vertex += stream.vertices.len() as u32;
-        }
+        let lengths: Vec<_> = streams.iter().map(|stream| stream.lengths()).collect();
+        stream::join(&streams, &mut list.streamed);
+        stream::push_draws(&lengths, list);
         self.sequence.arrange(list);
         topology::arrange(self.topology, list);
     }

@@ -49,6 +49,7 @@ pub mod parts;
 pub mod sequence;
 pub mod shapes;
 pub mod splits;
+pub mod stream;
 pub mod table;
 pub mod topology;
 pub mod walk;
@@ -65,26 +66,22 @@ use self::certified::{Certified, bounds, guarded};
 use self::context::WalkContext;
 use self::footprint::Footprint;
 use self::measure::Errors;
-use self::pages::{Grid, Pages, Row, TraversalDirection};
+use self::pages::{Grid, MAX_PAGES, Pages, Row, TraversalDirection};
 use self::sequence::Sequence;
 use self::shapes::Shapes;
 use self::splits::{Levels, Splits};
+use self::stream::{MAX_TRIANGLES, Stream};
 use self::table::{Radial, eye_height_m};
-use self::walk::{Stream, Worker};
-use super::{
-    Diagnostics, Entry, Need, SelectInParts, Setting, Settings, Technique, Values, Variant, select_within_limits,
-};
-use crate::draw::{
-    DepthMode, Draw, DrawKinds, DrawList, Geometry, Instance, Limits, PipelineRequirements, Source, Topology,
-};
+use self::walk::Worker;
+use super::entry::{Entry, Variant};
+use super::settings::{Need, Setting, Settings, Values};
+use super::technique::{Diagnostics, SelectInParts, Technique};
+use super::within_limits::select_within_limits;
+use crate::draw::{DepthMode, DrawKinds, DrawList, Geometry, Limits, PipelineRequirements, Topology};
 use crate::height::Field;
 use crate::height::cave::Cave;
 use crate::view::{Containment, Lens, View};
 
-/// Maximum number of triangles of a frame, for which buffers are allocated. The tolerance is scaled until they suffice.
-const MAX_TRIANGLES: usize = 1 << 21;
-/// Maximum number of pages. Above it, pages are made larger.
-const MAX_PAGES: u64 = 1 << 16;
 /// Number of triangles in the last frame from which rows are walked on all cores. Below it, distributing them costs
 /// more.
 const MIN_PARALLEL: usize = 20_000;
@@ -372,33 +369,13 @@ impl SortedStrips {
             std::mem::swap(&mut streamed.indices, &mut worker.stream.indices);
         } else {
             let streams: Vec<&Stream> = workers[..lengths.len()].iter().map(|worker| &worker.stream).collect();
-            join_streams(&streams, streamed);
+            stream::join(&streams, streamed);
         }
-        let [mut first_vertex, mut first] = [0; 2];
-        for (batch, [vertices, indices]) in (0u32..).zip(lengths.iter().map(|own| own.map(|n| n as u32))) {
-            list.instances.push(Instance { batch, ..Instance::default() });
-            let (source, topology) = (Source::Streamed, Topology::Triangles);
-            let (indices, instances) = (first..first + indices, batch..batch + 1);
-            first = indices.end;
-            list.draws.push(Draw { source, topology, indices, instances, first_vertex });
-            first_vertex += vertices;
-        }
+        stream::push_draws(lengths, list);
         list.fraction_bits = self.blend.fraction_bits();
         self.sequence.arrange(list);
         topology::arrange(self.topology, list);
     }
-}
-
-/// Concatenates all streams. Indices count from the first vertex of their own stream. Both arrays have about the same
-/// size, so one core copies the vertices and another the indices.
-fn join_streams(streams: &[&Stream], into: &mut Geometry) {
-    let Geometry { vertices, indices, .. } = into;
-    vertices.clear();
-    indices.clear();
-    rayon::join(
-        || streams.iter().for_each(|stream| vertices.extend_from_slice(&stream.vertices)),
-        || streams.iter().for_each(|stream| indices.extend_from_slice(&stream.indices)),
-    );
 }
 
 impl Technique for SortedStrips {

@@ -11,6 +11,9 @@ use super::depth_sorter::Crossing;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
+/// Maximum number of pages. Above it, pages are made larger.
+pub const MAX_PAGES: u64 = 1 << 16;
+
 /// Grid of pages over a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {

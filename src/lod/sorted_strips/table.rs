@@ -3,7 +3,9 @@
 //! LOD = LUT[distance² · scale]
 //!
 //! The distance combines the distance in plan from the eye to the nearest point of a square with the eye's height above
-//! the terrain below it. Any table may be given; its Lipschitz condition is always checked.
+//! the terrain below it. Levels must rise with the distance, and none may begin within reach of squares that touch one
+//! two levels finer (a Lipschitz condition). Levels that violate it are moved to greater distances. A table is stored as
+//! the entry at which each level begins.
 
 use super::blend::Blend;
 use super::splits::Levels;
@@ -13,78 +15,25 @@ use crate::view::{Lens, View};
 /// Number of entries of a table.
 const ENTRIES: usize = 1 << 14;
 
-/// Levels by squared distance.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Table {
-    levels: Vec<u8>,
-    /// Entries per square metre.
-    scale: f64,
-}
-
-impl Table {
-    /// Creates a table of any levels. The last entry holds for all greater distances. `scale` is entries per square
-    /// metre.
-    ///
-    /// # Panics
-    /// If `levels` is empty.
-    pub fn new(levels: Vec<u8>, scale: f64) -> Self {
-        assert!(!levels.is_empty());
-        Self { levels, scale }
-    }
-
-    /// Creates levels that rise by one with each doubling of the distance, for triangles of constant size on the
-    /// screen. Level 1 begins at `unit_m` metres; the maximum is `max`. The table extends further by `more_m` metres,
-    /// for repairs. Scales are powers of four, so a smaller unit never gives a finer level.
-    pub fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
-        let scale = doubling_scale(unit_m, max, more_m);
-        let level = |k: usize| {
-            let distance = doublings(k, scale, unit_m);
-            (0..max).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
-        };
-        Self { levels: (0..ENTRIES).map(level).collect(), scale }
-    }
-
-    /// Returns the level at a squared distance, metres².
-    #[inline]
-    pub fn level(&self, squared_m2: f64) -> u32 {
-        u32::from(self.levels[((squared_m2 * self.scale) as usize).min(self.levels.len() - 1)])
-    }
-
-    /// Returns the first level, from 1 to `max`, that violates the Lipschitz condition for cells of this diagonal
-    /// (metres); `None` if there is none. Levels must rise with the distance. None may begin within reach of squares
-    /// that touch one two levels finer.
-    pub fn first_violation(&self, diagonal_m: f64, max: u32) -> Option<u32> {
-        let falls = self.levels.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| u32::from(pair[0]));
-        let steps = Steps::of(self, max);
-        falls.or_else(|| (2..=max).find(|&level| !steps.begins_at(level, steps.min_m(level, diagonal_m))))
-    }
-
-    /// Lowers levels where they violate the condition, and nowhere else.
-    pub fn repair(&mut self, diagonal_m: f64, max: u32) {
-        let begins = Steps::of(self, max).repaired(diagonal_m).begins;
-        for (k, level) in self.levels.iter_mut().enumerate() {
-            *level = begins.iter().rposition(|&begin| begin <= k).unwrap_or(0) as u8;
-        }
-    }
-}
-
-/// A table compressed to the entry at which each level begins; levels never fall.
+/// A table, as the entry at which each level begins. The last entry holds for all greater distances.
 #[derive(Clone, Debug, PartialEq)]
 struct Steps {
     /// First entry of each level; the number of entries if it does not begin.
     begins: Vec<usize>,
+    /// Entries per square metre.
     scale: f64,
     entries: usize,
 }
 
 impl Steps {
-    /// Returns the entries from which on every level of a table is at least this one, up to `max`.
-    fn of(table: &Table, max: u32) -> Self {
-        let begin = |level: u32| table.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1);
-        Self { begins: (0..=max).map(begin).collect(), scale: table.scale, entries: table.levels.len() }
+    /// Creates a table of one entry: the same level everywhere. The maximum is `max`.
+    fn constant(level: u32, max: u32) -> Self {
+        Self { begins: (0..=max).map(|l| usize::from(l > level)).collect(), scale: 0.0, entries: 1 }
     }
 
-    /// Returns the steps of [`Table::doubling`] without building the table.
+    /// Creates levels that rise by one with each doubling of the distance, for triangles of constant size on the screen.
+    /// Level 1 begins at `unit_m` metres; the maximum is `max`. The table extends further by `more_m` metres, for repairs.
+    /// Scales are powers of four, so a smaller unit never gives a finer level.
     fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
         let scale = doubling_scale(unit_m, max, more_m);
         let begin = |level: u32| {
@@ -172,8 +121,8 @@ impl Radial {
             }
             // Parallel projection has the same level everywhere.
             Lens::Orthographic { .. } => {
-                let level = (0..max).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u8;
-                Steps::of(&Table::new(vec![level], 0.0), max)
+                let level = (0..max).take_while(|&l| sample_px * f64::from(2u32 << l) <= edge_px).count() as u32;
+                Steps::constant(level, max)
             }
         };
         // A sliding vertex and the ends of its edge lie in a square of the next level. That square begins before the
@@ -182,11 +131,6 @@ impl Radial {
         let diagonals = if matches!(blend, Blend::End(_)) { 2.0 } else { 1.0 };
         let radial = Self::of(field, view, &steps.repaired(diagonals * dx.hypot(dz)));
         if blend == Blend::Off { radial } else { radial.blending(max) }
-    }
-
-    /// Applies a table up to level `max` that satisfies the condition, from the view's eye.
-    pub fn new(field: &Field, view: &View, table: &Table, max: u32) -> Self {
-        Self::of(field, view, &Steps::of(table, max))
     }
 
     fn of(field: &Field, view: &View, steps: &Steps) -> Self {
@@ -258,6 +202,53 @@ impl Levels for Radial {
 mod tests {
     use super::*;
 
+    /// The published table: a level for each entry.
+    #[derive(Clone, PartialEq)]
+    struct Table {
+        levels: Vec<u8>,
+        /// Entries per square metre.
+        scale: f64,
+    }
+
+    impl Table {
+        /// The table of [`Steps::doubling`].
+        fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
+            let scale = doubling_scale(unit_m, max, more_m);
+            let level = |k: usize| {
+                let distance = doublings(k, scale, unit_m);
+                (0..max).take_while(|&l| distance >= f64::from(1u32 << l)).count() as u8
+            };
+            Self { levels: (0..ENTRIES).map(level).collect(), scale }
+        }
+
+        /// Returns the level at a squared distance, metres².
+        fn level(&self, squared_m2: f64) -> u32 {
+            u32::from(self.levels[((squared_m2 * self.scale) as usize).min(self.levels.len() - 1)])
+        }
+
+        /// Returns the entries from which on every level is at least this one, up to `max`.
+        fn steps(&self, max: u32) -> Steps {
+            let begin = |level: u32| self.levels.iter().rposition(|&l| u32::from(l) < level).map_or(0, |k| k + 1);
+            Steps { begins: (0..=max).map(begin).collect(), scale: self.scale, entries: self.levels.len() }
+        }
+
+        /// Returns the first level, from 1 to `max`, that violates the Lipschitz condition for cells of this diagonal
+        /// (metres); `None` if there is none.
+        fn first_violation(&self, diagonal_m: f64, max: u32) -> Option<u32> {
+            let falls = self.levels.windows(2).find(|pair| pair[1] < pair[0]).map(|pair| u32::from(pair[0]));
+            let steps = self.steps(max);
+            falls.or_else(|| (2..=max).find(|&level| !steps.begins_at(level, steps.min_m(level, diagonal_m))))
+        }
+
+        /// Lowers levels to those of the repaired steps.
+        fn repair(&mut self, diagonal_m: f64, max: u32) {
+            let begins = self.steps(max).repaired(diagonal_m).begins;
+            for (k, level) in self.levels.iter_mut().enumerate() {
+                *level = begins.iter().rposition(|&begin| begin <= k).unwrap_or(0) as u8;
+            }
+        }
+    }
+
     #[test]
     fn invalid_tables_are_repaired_and_valid_ones_kept() {
         let mut seed = 3u32;
@@ -273,7 +264,7 @@ mod tests {
                 level = (level + u8::from(random(step) == 0)).min(6);
                 if round % 2 == 0 && random(5000) == 0 { random(7) as u8 } else { level }
             };
-            let mut table = Table::new((0..20_000).map(entry).collect(), 1.0);
+            let mut table = Table { levels: (0..20_000).map(entry).collect(), scale: 1.0 };
             let before = table.clone();
             match table.first_violation(0.05, 6) {
                 Some(_) => invalid += 1,
@@ -286,6 +277,14 @@ mod tests {
             assert!(table.levels.iter().zip(&before.levels).all(|(new, old)| new <= old), "a level was raised");
         }
         assert!(invalid > 50 && valid > 50, "{invalid} invalid, {valid} valid");
+    }
+
+    #[test]
+    fn a_constant_table_has_one_level() {
+        for level in 0..=4 {
+            let table = Table { levels: vec![level as u8], scale: 0.0 };
+            assert_eq!(Steps::constant(level, 4), table.steps(4));
+        }
     }
 
     /// Compares the steps with a table at every entry and between entries.
@@ -304,10 +303,10 @@ mod tests {
         for (unit_m, max, more_m) in [(10.0, 5, 1.0), (3.7, 6, 40.0), (0.01, 4, 9.0), (1e5, 8, 700.0), (1.0, 1, 0.5)] {
             let mut table = Table::doubling(unit_m, max, more_m);
             let steps = Steps::doubling(unit_m, max, more_m);
-            assert_eq!(steps, Steps::of(&table, max), "unit {unit_m} m");
+            assert_eq!(steps, table.steps(max), "unit {unit_m} m");
             table.repair(0.3 * unit_m, max);
             let repaired = steps.repaired(0.3 * unit_m);
-            assert_eq!(repaired, Steps::of(&table, max), "unit {unit_m} m");
+            assert_eq!(repaired, table.steps(max), "unit {unit_m} m");
             let radial = Radial::of(&field, &view, &repaired);
             for entry in 0..ENTRIES + 100 {
                 let squared_m2 = (entry as f64 + 0.5) / table.scale;

@@ -32,29 +32,8 @@ use super::depth_sorter::{Crossing, DepthSorter};
 use super::pages::{Pages, Row, Run, TraversalDirection, placed};
 use super::shapes::{BACK, LEADING, Shape, TRAILING, slot};
 use super::splits::Levels;
+use super::stream::Stream;
 use crate::draw::ExplicitVertex;
-
-/// Vertices and indices of a part of a frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stream {
-    /// Vertices, each once.
-    pub vertices: Vec<ExplicitVertex>,
-    /// Three indices per triangle, nearest first, relative to the first vertex of their row.
-    pub indices: Vec<u32>,
-}
-
-impl Stream {
-    /// Returns the number of vertices and of indices.
-    pub fn lengths(&self) -> [usize; 2] {
-        [self.vertices.len(), self.indices.len()]
-    }
-
-    /// Empties it and keeps its memory.
-    pub fn clear(&mut self) {
-        self.vertices.clear();
-        self.indices.clear();
-    }
-}
 
 /// Buffers for walking rows, reused from frame to frame without allocation.
 #[derive(Default)]
@@ -138,13 +117,6 @@ struct Walk<'a, L> {
 }
 
 impl<L: Levels> WalkContext<'_, L> {
-    /// Walks a row of pages.
-    pub fn walk(&self, row: &Row) -> Stream {
-        let mut worker = Worker::default();
-        self.walk_on(row, &mut worker);
-        worker.stream
-    }
-
     /// Walks a row of pages and appends it to the worker's stream.
     pub fn walk_on(&self, row: &Row, worker: &mut Worker) {
         let side = self.pages.grid.side();

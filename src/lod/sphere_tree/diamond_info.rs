@@ -2,16 +2,12 @@
 
 use glam::DVec3;
 
-use super::lattice::Place;
-
 /// Relative margin of a ball's radius for rounding, far above that of a distance in f64.
 pub const SPARE: f64 = 1e-6;
 
 /// A diamond with its error and ball.
 #[derive(Clone, Copy, Debug)]
 pub struct DiamondInfo {
-    /// Middle on the lattice.
-    pub at: Place,
     /// Index.
     pub index: usize,
     /// Middle relative to the field's first sample, at its height, metres.

@@ -150,9 +150,9 @@ impl Measured {
         if let Some(evaluated) = &self.evaluated {
             let Size { height, error, ball } = evaluated.size(at, index);
             let [x, z] = [0, 1].map(|k| f64::from(at[k]) * self.field.spacing[k]);
-            return DiamondInfo { at, index, centre: DVec3::new(x, height, z), error, ball };
+            return DiamondInfo { index, centre: DVec3::new(x, height, z), error, ball };
         }
-        DiamondInfo { at, index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
+        DiamondInfo { index, centre: self.centre(at), error: self.errors[index], ball: self.balls[index] }
     }
 
     /// Returns true if a diamond has a sphere. Returns true for every diamond of a procedural terrain.
@@ -201,13 +201,13 @@ mod tests {
     }
 
     /// Calls `visit` for every diamond.
-    fn each(measured: &Measured, mut visit: impl FnMut(DiamondInfo)) {
+    fn each(measured: &Measured, mut visit: impl FnMut(Place, DiamondInfo)) {
         for level in 0..measured.lattice.levels() {
             let [x_count, z_count] = measured.lattice.count(level);
             for (i, j) in (0..z_count).flat_map(|j| (0..x_count).map(move |i| (i, j))).filter(|(i, j)| (i | j) & 1 == 1)
             {
                 let at = [i << level, j << level];
-                visit(measured.diamond(at, measured.lattice.index(at).expect("a diamond")));
+                visit(at, measured.diamond(at, measured.lattice.index(at).expect("a diamond")));
             }
         }
     }
@@ -217,11 +217,11 @@ mod tests {
         for (size, band) in [([33, 33], 1.0), ([33, 33], 1.3), ([37, 21], 1.0), ([37, 21], 1.3), ([2, 30], 1.3)] {
             let measured = Measured::new(field(size), band, &Progress::default());
             let mut children = 0;
-            each(&measured, |parent| {
+            each(&measured, |middle, parent| {
                 let out = |at| measured.lattice.sticks_out(at);
-                for (at, index) in measured.lattice.children(parent.at) {
+                for (at, index) in measured.lattice.children(middle) {
                     let child = measured.diamond(at, index);
-                    let growth = if !out(parent.at) && out(at) { band } else { 1.0 };
+                    let growth = if !out(middle) && out(at) { band } else { 1.0 };
                     let reach = child.centre.distance(parent.centre) + f64::from(child.ball) * f64::from(growth);
                     assert!(reach <= f64::from(parent.ball) && child.error * growth <= parent.error, "{parent:?}");
                     assert!(measured.lattice.parents(at).any(|(_, index)| index == parent.index), "{child:?}");
@@ -251,8 +251,8 @@ mod tests {
     /// Checks the samples under every wedge against its ball and error. Returns the number of samples.
     fn check_samples(measured: &Measured) -> usize {
         let mut samples = 0;
-        each(measured, |diamond| {
-            let Diamond { ends, apexes } = Diamond::around(diamond.at);
+        each(measured, |middle, diamond| {
+            let Diamond { ends, apexes } = Diamond::around(middle);
             for apex in apexes.into_iter().filter(|&at| measured.lattice.contains(at)) {
                 let mut corners = [apex, ends[0], ends[1]].map(|at| {
                     let [x, z] = measured.lattice.on_field(at);

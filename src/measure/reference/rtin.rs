@@ -200,7 +200,7 @@ mod tests {
             let mesh = Rtin::refined(&field, 1.0);
             let mut triangles = Vec::new();
             mesh.visit(|t| triangles.push(Drawn { corners: facing_up(&t.map(|p| mesh.corner(p))), instance: 0 }));
-            let proof = watertight::prove(&field, &view.frustum(), &triangles).unwrap();
+            let proof = watertight::prove(&field, &view.frustum(), &triangles, 0).unwrap();
             assert_eq!(proof.doubled_area, 2 * 32 * 32);
             assert!((10..200).contains(&proof.triangles), "{at:?}: {} triangles", proof.triangles);
         }

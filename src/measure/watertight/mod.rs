@@ -23,7 +23,6 @@
 pub mod cave;
 pub mod counter_example;
 mod edges;
-pub mod plan;
 mod seams;
 mod sweep;
 mod vertices;
@@ -53,18 +52,12 @@ pub struct Proof {
 
 /// Proves that triangles are one surface that leaves out nothing in view. Needs about 100 bytes a triangle.
 ///
-/// # Panics
-/// If the field has more than 2^24 samples a side, or there are more than 2^31 triangles.
-pub fn prove(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Result<Proof, Box<CounterExample>> {
-    prove_between(field, frustum, triangles, 0)
-}
-
-/// Proves the same of triangles whose corners have `fraction_bits` fraction bits. Their border must consist of straight
-/// lines between samples; vertices may lie anywhere on these lines.
+/// Corners have `fraction_bits` fraction bits. If there are any, the border must consist of straight lines between
+/// samples; vertices may lie anywhere on these lines.
 ///
 /// # Panics
 /// If there are more than 2^31 triangles, or more than 2^24 parts of samples a side.
-pub fn prove_between(
+pub fn prove(
     field: &Field,
     frustum: &Frustum,
     triangles: &[Drawn],
@@ -138,7 +131,7 @@ pub fn prove_list(
         return Ok(Proof { triangles: 2 * pairs, doubled_area, border_edges: seam_edges + open_edges });
     }
     match seams {
-        Seams::Shared => prove_between(field, &frustum, &triangles, list.fraction_bits),
+        Seams::Shared => prove(field, &frustum, &triangles, list.fraction_bits),
         Seams::Skirts => {
             let skirts = expand::skirts(field, &frame, resident, list);
             prove_with_skirts(field, &frustum, &triangles, &skirts)

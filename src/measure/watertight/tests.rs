@@ -46,13 +46,13 @@ fn samples_surface(field: &Field) -> Vec<Drawn> {
 }
 
 fn fault(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Kind {
-    prove(field, frustum, triangles).unwrap_err().kind
+    prove(field, frustum, triangles, 0).unwrap_err().kind
 }
 
 #[test]
 fn the_samples_own_surface_is_proven() {
     let field = field(&[]);
-    let proof = prove(&field, &everything(), &samples_surface(&field)).unwrap();
+    let proof = prove(&field, &everything(), &samples_surface(&field), 0).unwrap();
     assert_eq!(proof, Proof { triangles: 128, doubled_area: 128, border_edges: 32 });
 }
 
@@ -92,7 +92,7 @@ fn crossing_triangles_overlap() {
     triangles = vec![drawn(&field, [[0, 0], [0, 8], [8, 0]]), drawn(&field, [[1, 1], [1, 2], [2, 1]])];
     assert_eq!(fault(&field, &nothing, &triangles), Kind::Overlap);
     triangles.pop();
-    prove(&field, &nothing, &triangles).unwrap();
+    prove(&field, &nothing, &triangles, 0).unwrap();
 }
 
 #[test]
@@ -111,11 +111,11 @@ fn missing_terrain_is_a_gap_if_it_may_be_seen_and_has_data() {
     triangles.drain(2 * (3 * 8 + 4)..2 * (3 * 8 + 5));
     assert_eq!(fault(&whole, &everything(), &triangles), Kind::Gap);
     assert_eq!(fault(&whole, &above(4.5, 3.5, 0.5), &triangles), Kind::Gap);
-    let proof = prove(&whole, &above(1.5, 1.5, 1.0), &triangles).unwrap();
+    let proof = prove(&whole, &above(1.5, 1.5, 1.0), &triangles, 0).unwrap();
     assert_eq!((proof.doubled_area, proof.border_edges), (126, 36));
     // One corner without data at each of the cell's triangles: its diagonal's end.
     let holed = field(&[3 * 9 + 5]);
-    prove(&holed, &everything(), &triangles).unwrap();
+    prove(&holed, &everything(), &triangles, 0).unwrap();
     let other = field(&[3 * 9 + 4]);
     assert_eq!(fault(&other, &everything(), &triangles), Kind::Gap);
 }
@@ -173,7 +173,7 @@ fn a_step_needs_walls_that_reach_down_and_face_the_lower_side() {
     let mut lower = step(&field, 3.0);
     lower[1].iter_mut().flat_map(|wall| &mut wall.corners).for_each(|corner| corner.y -= 0.5);
     assert_eq!(found(&lower), Err(Kind::Seam), "they hang half a metre below the edge");
-    assert_eq!(prove(&field, &all, &step(&field, 3.0)[0]).unwrap_err().kind, Kind::Crack);
+    assert_eq!(prove(&field, &all, &step(&field, 3.0)[0], 0).unwrap_err().kind, Kind::Crack);
 }
 
 #[test]

@@ -1,19 +1,17 @@
 //! A sweep case as plain data, and its check against every invariant.
 
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::str::FromStr;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Failure;
 use super::terrain::Terrain;
 use super::viewpoint::Viewpoint;
 use crate::height::Field;
-use crate::lod::{self, Entry, Settings};
-use crate::stress::invariants::{INVARIANTS, Subject, Violation};
-use crate::stress::panic_text;
+use crate::lod::{Entry, Settings};
+use crate::stress::invariants::{self, Subject, Violation};
+use crate::stress::panics;
 use crate::view::{Metric, Tolerance, View};
 
 /// A technique with settings, terrain, a view and a tolerance.
@@ -38,12 +36,24 @@ pub struct SweepCase {
     pub paper_metric: bool,
 }
 
-impl SweepCase {
-    /// Returns the technique's table entry.
-    pub fn entry(&self) -> Result<&'static Entry, String> {
-        lod::find(&self.technique).ok_or_else(|| format!("{}: no such technique", self.technique))
-    }
+/// A case that violates an invariant.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// The case.
+    pub case: SweepCase,
+    /// Name of the invariant.
+    pub invariant: &'static str,
+    /// The violation.
+    pub violation: Violation,
+}
 
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
+    }
+}
+
+impl SweepCase {
     /// Creates the terrain and the view.
     pub fn scene(&self) -> (Arc<Field>, View) {
         let field = Arc::new(self.terrain.field());
@@ -52,21 +62,13 @@ impl SweepCase {
         (field, view)
     }
 
-    /// Checks every invariant. Returns the first failure; a panic is a failure.
-    pub fn check(&self) -> Result<(), Box<Failure>> {
-        match self.entry() {
-            Ok(entry) => self.check_with(entry),
-            Err(why) => Err(self.fails("it can be prepared", Violation::new(("the case's view", self.scene().1), why))),
-        }
-    }
-
-    /// Checks with another table entry in place of the technique's.
-    pub fn check_with(&self, entry: &Entry) -> Result<(), Box<Failure>> {
+    /// Checks every invariant with the table entry of the technique. Returns the first failure; a panic is a failure.
+    pub fn check(&self, entry: &Entry) -> Result<(), Box<Failure>> {
         let (field, view) = self.scene();
         let views = [("the case's view", view)];
-        match catch_unwind(AssertUnwindSafe(|| self.keeps_invariants(entry, &field, &views))) {
+        match panics::caught(|| self.keeps_invariants(entry, &field, &views)) {
             Ok(outcome) => outcome.map_err(|(invariant, violation)| self.fails(invariant, violation)),
-            Err(panic) => Err(self.fails("no panic", Violation::new(views[0], panic_text(&*panic)))),
+            Err(text) => Err(self.fails("no panic", Violation::new(views[0], text))),
         }
     }
 
@@ -84,10 +86,8 @@ impl SweepCase {
         let prepared = settings.and_then(|settings| entry.prepare(field, &settings));
         let mut technique = prepared.map_err(|why| ("it can be prepared", Violation::new(views[0], why)))?;
         let tolerances_px = [1.0, 2.0, 16.0].map(|factor| factor * self.tolerance_px);
-        let mut subject =
-            Subject { field, technique: &mut *technique, views, tolerances_px: &tolerances_px, time_s: 0.0 };
-        let mut invariants = INVARIANTS.iter().filter(|invariant| invariant.is_for(&self.technique));
-        invariants
+        let mut subject = Subject { tolerances_px: &tolerances_px, ..Subject::new(field, &mut *technique, views) };
+        invariants::of_technique(&self.technique)
             .try_for_each(|invariant| (invariant.check)(&mut subject).map_err(|violation| (invariant.name, violation)))
     }
 }

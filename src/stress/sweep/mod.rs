@@ -13,10 +13,10 @@ pub mod viewpoint;
 
 use rayon::prelude::*;
 
-pub use self::case::SweepCase;
+pub use self::case::{Failure, SweepCase};
+use super::case::{Case, Kind};
+use super::finding::Finding;
 use super::forms::TechniqueConfig;
-use super::invariants::Violation;
-use super::{Case, Finding, Kind};
 
 /// The family `sweep`.
 pub const CASES: &[Case] = &[Case { family: "sweep", name: "random cases", kind: Kind::PerTechnique(of_config) }];
@@ -28,29 +28,8 @@ const SUITE_SEED: u64 = 19;
 /// Maximum number of failures that are shrunk; each takes as long as hundreds of cases.
 const MAX_SHRUNK: usize = 4;
 
-/// A case that violates an invariant.
-#[derive(Clone, Debug)]
-pub struct Failure {
-    /// The case.
-    pub case: SweepCase,
-    /// Name of the invariant.
-    pub invariant: &'static str,
-    /// The violation.
-    pub violation: Violation,
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}\n  SWEEP_CASE='{}'", self.invariant, self.violation.why, self.case)
-    }
-}
-
-/// Checks cases of built-in techniques on all cores. Returns the failures in order, the first few of them shrunk.
-pub fn run(cases: impl ParallelIterator<Item = SweepCase>) -> Vec<Failure> {
-    run_with(cases, SweepCase::check)
-}
-
-fn run_with(
+/// Checks cases on all cores. Returns the failures in order, the first few of them shrunk.
+pub fn run(
     cases: impl ParallelIterator<Item = SweepCase>,
     check: impl Fn(&SweepCase) -> Result<(), Box<Failure>> + Sync,
 ) -> Vec<Failure> {
@@ -63,8 +42,8 @@ fn run_with(
 /// Checks random cases of one technique and variant.
 fn of_config(config: &TechniqueConfig) -> Vec<Finding> {
     let case = |number| random::case(SUITE_SEED, number, config.entry, Some(config.variant));
-    let check = |case: &SweepCase| case.check_with(config.entry);
-    let failures = run_with((0..SUITE_CASES).into_par_iter().map(case), check);
+    let check = |case: &SweepCase| case.check(config.entry);
+    let failures = run((0..SUITE_CASES).into_par_iter().map(case), check);
     let first = failures.first();
     let count = Finding::within("cases that fail", failures.len() as f64, 0.0);
     vec![

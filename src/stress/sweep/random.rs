@@ -6,19 +6,13 @@ use super::case::SweepCase;
 use super::terrain::{Terrain, Voids};
 use super::viewpoint::{CaseLens, Direction, Viewpoint};
 use crate::height::synth::KINDS;
-use crate::lod::{Entry, Setting, TECHNIQUES, Values};
+use crate::lod::{Entry, Setting, Values};
 
 /// Maximum side, samples.
 const MAX_SIDE: u32 = 1300;
 /// Maximum numbers of samples of 70 %, the next 22 % and the next 7 % of cases; 1 % are unlimited. Many small cases
 /// find more failures than few large ones.
 const MAX_SAMPLES: [u64; 3] = [3_000, 12_000, 100_000];
-
-/// Returns the case with a number, of any technique.
-pub fn any(seed: u64, number: u64) -> SweepCase {
-    let entry = &TECHNIQUES[(number % TECHNIQUES.len() as u64) as usize];
-    case(seed, number, entry, None)
-}
 
 /// Returns the case with a number, of one technique. `variant`: `None` for any, `Some(None)` for the default.
 pub fn case(seed: u64, number: u64, entry: &Entry, variant: Option<Option<&str>>) -> SweepCase {

@@ -1,7 +1,6 @@
 //! Shrinks a failing sweep case to a simpler one that fails in the same way.
 
-use super::Failure;
-use super::case::SweepCase;
+use super::case::{Failure, SweepCase};
 use super::terrain::Voids;
 use super::viewpoint::{CaseLens, Direction, Viewpoint};
 

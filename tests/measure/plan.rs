@@ -1,10 +1,9 @@
 //! A counter-example as a picture: the drawn triangles in plan around what is wrong, north up.
 
+use cuesta::internal::draw::expand::Drawn;
+use cuesta::internal::height::surface::{Corner, Triangle, doubled_area};
+use cuesta::internal::measure::watertight::{CounterExample, Kind};
 use image::{Rgb, RgbImage};
-
-use super::counter_example::{CounterExample, Kind};
-use crate::draw::expand::Drawn;
-use crate::height::surface::{Corner, Triangle, doubled_area};
 
 /// Width and height of the picture, pixels.
 const SIZE: u32 = 512;
@@ -121,42 +120,37 @@ impl Window {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn triangle(corners: [[i32; 2]; 3]) -> Triangle {
+    corners.map(|[x, z]| Corner { x, z, y: 0.0 })
+}
 
-    fn triangle(corners: [[i32; 2]; 3]) -> Triangle {
-        corners.map(|[x, z]| Corner { x, z, y: 0.0 })
-    }
+fn example(kind: Kind, triangles: Vec<Triangle>) -> CounterExample {
+    CounterExample { kind, triangles, text: String::new() }
+}
 
-    fn example(kind: Kind, triangles: Vec<Triangle>) -> CounterExample {
-        CounterExample { kind, triangles, text: String::new() }
-    }
+/// The colour at a lattice position, for pictures of a window of 16 cells from (−4, −4).
+fn at(picture: &RgbImage, x: f64, z: f64) -> Rgb<u8> {
+    let px = |n: f64| ((n + 4.0) * 32.0) as u32;
+    *picture.get_pixel(px(x), px(z))
+}
 
-    /// The colour at a lattice position, for pictures of a window of 16 cells from (−4, −4).
-    fn at(picture: &RgbImage, x: f64, z: f64) -> Rgb<u8> {
-        let px = |n: f64| ((n + 4.0) * 32.0) as u32;
-        *picture.get_pixel(px(x), px(z))
-    }
+#[test]
+fn every_triangle_is_where_it_lies() {
+    let (west, east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
+    let drawn = [west, east].map(|corners| Drawn { corners, instance: 0 });
+    let shown = picture(&drawn, &example(Kind::Overlap, vec![west]));
+    assert_eq!((at(&shown, 2.0, 5.0), at(&shown, 5.0, 2.0), at(&shown, -2.0, 5.0)), (FAULT, TERRAIN, GROUND));
+    assert_eq!((at(&shown, 4.0, 4.0), at(&shown, 8.0, 4.0)), (FAULT_EDGE, EDGE));
+    let twice = picture(&drawn, &example(Kind::Overlap, vec![west, west]));
+    assert_eq!((at(&twice, 2.0, 5.0), at(&twice, 5.0, 2.0)), (FAULT_TWICE, TERRAIN));
+    let gap = picture(&drawn[1..], &example(Kind::Gap, vec![west]));
+    assert_eq!((at(&gap, 2.0, 5.0), at(&gap, 5.0, 2.0)), (MISSING, TERRAIN));
+}
 
-    #[test]
-    fn every_triangle_is_where_it_lies() {
-        let (west, east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
-        let drawn = [west, east].map(|corners| Drawn { corners, instance: 0 });
-        let shown = picture(&drawn, &example(Kind::Overlap, vec![west]));
-        assert_eq!((at(&shown, 2.0, 5.0), at(&shown, 5.0, 2.0), at(&shown, -2.0, 5.0)), (FAULT, TERRAIN, GROUND));
-        assert_eq!((at(&shown, 4.0, 4.0), at(&shown, 8.0, 4.0)), (FAULT_EDGE, EDGE));
-        let twice = picture(&drawn, &example(Kind::Overlap, vec![west, west]));
-        assert_eq!((at(&twice, 2.0, 5.0), at(&twice, 5.0, 2.0)), (FAULT_TWICE, TERRAIN));
-        let gap = picture(&drawn[1..], &example(Kind::Gap, vec![west]));
-        assert_eq!((at(&gap, 2.0, 5.0), at(&gap, 5.0, 2.0)), (MISSING, TERRAIN));
-    }
-
-    #[test]
-    fn the_vertex_with_two_heights_is_marked() {
-        let (west, mut east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
-        east[1].y = 1.0;
-        let shown = picture(&[], &example(Kind::Crack, vec![west, east]));
-        assert_eq!((at(&shown, 8.0, 8.0), at(&shown, 0.0, 0.0)), (VERTEX, FAULT_EDGE));
-    }
+#[test]
+fn the_vertex_with_two_heights_is_marked() {
+    let (west, mut east) = (triangle([[0, 0], [0, 8], [8, 8]]), triangle([[0, 0], [8, 8], [8, 0]]));
+    east[1].y = 1.0;
+    let shown = picture(&[], &example(Kind::Crack, vec![west, east]));
+    assert_eq!((at(&shown, 8.0, 8.0), at(&shown, 0.0, 0.0)), (VERTEX, FAULT_EDGE));
 }
