@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::source::{Block, Coverage, HeightSource};
-use super::{Error, Field, Holes, Raster, Samples};
+use super::error::Error;
+use super::field::Field;
+use super::holes::Holes;
+use super::raster::Raster;
+use super::samples::Samples;
 
 /// Floor and ceiling of a cave, welded: at samples of rock both have the same height.
 ///
@@ -55,8 +58,7 @@ impl Cave {
             floor.source().with_raster(Raster::new(samples, floor.stored(), Holes::none(heights.len())))
         };
         let ceiling = Arc::new(floor.with_source(welded(high)));
-        let source = CaveFloor { floor: welded(low), ceiling: Arc::clone(&ceiling) };
-        Self { floor: Arc::new(floor.with_source(Arc::new(source))), ceiling }
+        Self { floor: Arc::new(floor.with_source(welded(low)).under(Arc::clone(&ceiling))), ceiling }
     }
 
     /// Returns the cave that a field is the floor of.
@@ -65,7 +67,7 @@ impl Cave {
         Some(Self { floor: Arc::clone(floor), ceiling })
     }
 
-    /// Returns the floor. Its source holds the ceiling, so that it stands for the cave wherever a field is needed.
+    /// Returns the floor. It holds the ceiling, so that it stands for the cave wherever a field is needed.
     pub fn floor(&self) -> &Arc<Field> {
         &self.floor
     }
@@ -79,56 +81,6 @@ impl Cave {
     #[inline]
     pub fn is_rock(&self, i: u32, j: u32) -> bool {
         self.floor.height(i, j) == self.ceiling.height(i, j)
-    }
-}
-
-/// The floor of a cave: any source, with a ceiling over it.
-#[derive(Clone, Debug)]
-pub struct CaveFloor {
-    floor: Arc<dyn HeightSource>,
-    ceiling: Arc<Field>,
-}
-
-impl HeightSource for CaveFloor {
-    fn size(&self) -> [u32; 2] {
-        self.floor.size()
-    }
-
-    fn height(&self, i: u32, j: u32) -> f32 {
-        self.floor.height(i, j)
-    }
-
-    fn is_hole(&self, i: u32, j: u32) -> bool {
-        self.floor.is_hole(i, j)
-    }
-
-    fn raster(&self) -> &Raster {
-        self.floor.raster()
-    }
-
-    fn coverage(&self) -> Coverage {
-        self.floor.coverage()
-    }
-
-    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
-        Arc::new(Self { floor: self.floor.with_raster(raster), ceiling: Arc::clone(&self.ceiling) })
-    }
-
-    fn read(&self, block: &Block, heights: &mut Vec<f32>) {
-        self.floor.read(block, heights);
-    }
-
-    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
-        self.floor.range_of(first, last)
-    }
-
-    fn range(&self) -> [f32; 2] {
-        let ([low, high], [over_low, over_high]) = (self.floor.range(), self.ceiling.range());
-        [low.min(over_low), high.max(over_high)]
-    }
-
-    fn ceiling(&self) -> Option<&Arc<Field>> {
-        Some(&self.ceiling)
     }
 }
 

@@ -2,8 +2,10 @@
 //!
 //! `cargo test --release --no-default-features -- --ignored make_assets` writes both files again, byte for byte.
 
+use super::field::Field;
+use super::holes::Holes;
+use super::samples::Samples;
 use super::synth::Kind;
-use super::{Field, Holes, Samples};
 
 /// Kind of landscape that [`demo`] was synthesised from.
 pub const KIND: Kind = Kind::Eroded;

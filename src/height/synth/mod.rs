@@ -9,12 +9,13 @@ pub mod noise;
 pub mod overlay;
 mod peers;
 mod plain;
+mod rock;
 mod settle;
 
 use std::fmt;
 use std::str::FromStr;
 
-use super::Field;
+use super::field::Field;
 
 /// A family of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

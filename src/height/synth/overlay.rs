@@ -5,7 +5,7 @@ use image::{Rgb, RgbImage};
 
 use super::flow::{Flow, Grid};
 use super::noise;
-use crate::height::Field;
+use crate::height::field::Field;
 
 type Colour = [f64; 3];
 
