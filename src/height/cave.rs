@@ -51,7 +51,7 @@ impl Cave {
         let [low, high] = [floor, ceiling].map(heights);
         let no_data = |k: usize| floor.holes().contains(k) || ceiling.holes().contains(k);
         let is_rock: Vec<bool> = (0..low.len()).map(|k| high[k] <= low[k] || no_data(k)).collect();
-        let between = meeting(floor, &low, &high, &is_rock);
+        let between = meeting(floor.stored(), &low, &high, &is_rock);
         let welded = |heights: Vec<f32>| {
             let height = |k: usize| if is_rock[k] { between.samples().height(k) } else { heights[k] };
             let samples = Samples::F32((0..heights.len()).map(height).collect());
@@ -86,8 +86,7 @@ impl Cave {
 
 /// Returns the surface along which floor and ceiling meet: half-way between them at rock beside the cave, filled in from
 /// there elsewhere.
-fn meeting(floor: &Field, low: &[f32], high: &[f32], is_rock: &[bool]) -> Raster {
-    let size = floor.stored();
+fn meeting(size: [u32; 2], low: &[f32], high: &[f32], is_rock: &[bool]) -> Raster {
     let [w, h] = size.map(|n| n as usize);
     let around = |n: usize, last: usize| n.saturating_sub(1)..=(n + 1).min(last);
     let is_beside = |k: usize| {

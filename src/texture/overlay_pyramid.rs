@@ -39,7 +39,6 @@ struct MipLevel {
 
 /// All mip levels of all pages.
 pub struct OverlayPyramid {
-    layout: PyramidLayout,
     levels: Vec<MipLevel>,
 }
 
@@ -63,12 +62,7 @@ impl OverlayPyramid {
         for _ in 0..cells.ilog2() {
             levels.extend(levels.last().map(|finer| finer.halved(layout.repeats)));
         }
-        Self { layout, levels }
-    }
-
-    /// Returns the grid of pages.
-    pub fn layout(&self) -> &PyramidLayout {
-        &self.layout
+        Self { levels }
     }
 
     /// Returns the number of mip levels of a page. The coarsest is one cell, or 2 × 2 texels.
@@ -84,11 +78,6 @@ impl OverlayPyramid {
     /// Returns the cells along a side of a page at a mip level.
     fn cells(&self, level: u32) -> u32 {
         1 << (self.levels() - 1 - level)
-    }
-
-    /// Returns the bytes of a page at a mip level.
-    pub fn bytes(&self, level: u32) -> u64 {
-        u64::from(self.side(level)).pow(2) * size_of::<Texel>() as u64
     }
 
     /// Returns a tile of constant size at a mip level: `side(0)`² texels, which cover 2^level × 2^level pages. `at`
@@ -195,8 +184,8 @@ mod tests {
 
     /// Returns the texels of a page at a mip level, row by row.
     fn page_texels(pyramid: &OverlayPyramid, page: [u32; 2], level: u32) -> Vec<Texel> {
-        assert!((0..2).all(|k| page[k] < pyramid.layout.pages[k]), "page {page:?}");
         let (of, side) = (&pyramid.levels[level as usize], pyramid.side(level) as usize);
+        assert!((0..2).all(|k| page[k] < (of.size[k] - 1) / pyramid.cells(level)), "page {page:?}");
         let [x, z] = page.map(|n| (n * pyramid.cells(level)) as usize);
         let row = |j: usize| (z + j) * of.size[0] as usize + x;
         (0..side).flat_map(|j| &of.texels[row(j)..row(j) + side]).copied().collect()
@@ -221,7 +210,7 @@ mod tests {
                 let side = pyramid.side(level);
                 for (x, z) in (0..4).flat_map(|x| (0..3).map(move |z| (x, z))) {
                     let own = page_texels(&pyramid, [x, z], level);
-                    assert_eq!(own.len() as u64 * 4, pyramid.bytes(level));
+                    assert_eq!(own.len(), side.pow(2) as usize);
                     if x < last[0] {
                         let east = page_texels(&pyramid, [(x + 1) % 4, z], level);
                         assert_eq!(column(&own, side, side - 1), column(&east, side, 0), "{x}, {z} at {level}");

@@ -229,11 +229,6 @@ impl WorkingSet {
     pub fn tiles(&self) -> impl Iterator<Item = (TileId, u32)> {
         self.tiles.iter().map(|(&tile, counts)| (tile, counts.len() as u32 - 1))
     }
-
-    /// Returns the need of the wedge with a key.
-    pub fn need(&self, key: u64) -> Option<&Need> {
-        self.needs.get(&key)
-    }
 }
 
 /// Returns the screen areas, texels, for which a wedge of a level needs level α of the root square's texture.
@@ -264,7 +259,7 @@ mod tests {
                 let shown = if is_hidden { -*area } else { *area };
                 let change = set.require(key as u64, wedge, shown, is_near);
                 changes[change as usize] += 1;
-                if let Some(need) = set.need(key as u64).filter(|_| !is_hidden || is_near) {
+                if let Some(need) = set.needs.get(&(key as u64)).filter(|_| !is_hidden || is_near) {
                     let alpha = if is_near { 18 } else { level_by_logarithm(*area, wedge.level) };
                     assert_eq!(need.alpha, alpha, "{wedge:?} with {area}");
                     assert_eq!(need.tile, wedge.tile(need.tile.level));

@@ -22,7 +22,7 @@ pub const SIDE_M: f64 = 524_288.0;
 /// Smallest distance of vertices, metres.
 pub const SPACING_M: f64 = 1.0 / 1024.0;
 /// Lattice positions along a side, [`SPACING_M`] apart.
-pub const LATTICE: u32 = (1 << 29) + 1;
+pub const LATTICE: u32 = (SIDE_M / SPACING_M) as u32 + 1;
 /// Number of displacement layers whose patches are at least 2 lattice steps wide.
 pub const LAYERS: u32 = 24;
 /// Width of the large patches, and heights of their control points, metres.

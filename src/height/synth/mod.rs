@@ -6,7 +6,6 @@ mod eroded;
 pub mod flow;
 mod fractal;
 pub mod noise;
-pub mod overlay;
 mod peers;
 mod plain;
 mod rock;
