@@ -23,7 +23,7 @@ use cuesta::internal::lod::sphere_tree::reach::{Reach, Viewpoint};
 use cuesta::internal::lod::sphere_tree::roam::Queues;
 use cuesta::internal::lod::sphere_tree::splits::{Found, Splits};
 use cuesta::internal::lod::{self, Settings};
-use cuesta::internal::texture::resolution::{level_by_exponent, level_by_logarithm};
+use cuesta::internal::texture::resolution::level_by_exponent;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
@@ -171,6 +171,11 @@ fn patches(field: &Arc<Field>, patches: &str, path: &[DVec3], px: f64) {
         times[median],
         times[last]
     );
+}
+
+/// The texture level by its definition: J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §4.3.
+fn level_by_logarithm(texels: f32, triangle_level: u32) -> i32 {
+    (0.5 * (f64::from(texels).log2() + f64::from(triangle_level + 1))).ceil() as i32
 }
 
 fn logarithm_against_exponent() {

@@ -8,9 +8,8 @@
 //! The next level may lie beyond a side, and beyond a seam of a finer quadrant. An odd vertex there whose morph has
 //! ended snaps to the even one before it. Sides marked as staying meet their own level.
 
-use super::Instance;
-use super::layout::{DistanceWeights, Frame, NO_LINE, ONE, SEAM};
-use super::place::relative_plan;
+use super::layout::{DistanceWeights, Frame, Instance, NO_LINE, ONE, SEAM};
+use super::relative::relative_plan;
 use super::weights::{Slot, vertex_level};
 
 pub use super::layout::MORPH_END;

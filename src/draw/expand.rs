@@ -1,9 +1,11 @@
 //! Expands a draw list to its triangles on the CPU: the reference of the vertex pipeline.
 
-use super::layout::Frame;
+use super::draws::{Draw, RESTART, Source, Topology};
+use super::geometry::Geometry;
+use super::layout::{Frame, Instance};
+use super::list::DrawList;
 use super::place::{explicit_height, explicit_position, placed};
 use super::skirts::is_skirted;
-use super::{Draw, DrawList, Geometry, Instance, RESTART, Source, Topology};
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::view::View;

@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use super::layout::Instance;
+
 /// A selection that runs on the device. All its draws are triangles of [`Source::Lattice`](super::Source::Lattice).
 #[derive(Clone, Debug)]
 pub struct GpuSelection {
@@ -56,7 +58,7 @@ pub const MAX_BYTES: usize = 1 << 27;
 impl GpuSelection {
     /// Returns true if every device can bind its buffers.
     pub fn fits(&self) -> bool {
-        let instances = self.instances * size_of::<super::Instance>();
+        let instances = self.instances * size_of::<Instance>();
         [4 * self.table.len(), 4 * self.scratch, instances].iter().all(|&bytes| bytes <= MAX_BYTES)
     }
 }

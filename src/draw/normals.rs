@@ -5,16 +5,6 @@ use glam::{Vec2, Vec3};
 use super::layout::{ExplicitVertex, Instance, VertexNormals};
 use super::place::explicit_weights;
 
-/// Source of the normals that light a technique's triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Normals {
-    /// Computed from the height texture for each pixel.
-    #[default]
-    Texture,
-    /// Interpolated between the vertices ([`Geometry::normals`](super::Geometry::normals)).
-    Vertices,
-}
-
 /// Packs a unit vector that does not point down in 32 bits: x in the lower half, z in the upper half, both snorm16.
 pub fn pack(normal: Vec3) -> u32 {
     let snorm = |n: f32| u32::from((n.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);

@@ -1,81 +1,12 @@
 //! Positions of vertices: the CPU reference of `shaders/position.glsl`, function by function.
 
 use super::distance;
-use super::layout::{Camera, ExplicitVertex, Frame, HeightMap, Instance, RenderOrigin, VertexFormat};
+use super::layout::{ExplicitVertex, Frame, Instance};
 use super::skirts::{self, SKIRT};
 use super::weights::{DistanceWeights, FINER, ONE, SkirtWeights, Slot, SlotWeights, Weights, vertex_level};
-use crate::height::{Field, Samples};
-use crate::view::{Lens, View};
+use crate::height::Field;
 
-impl RenderOrigin {
-    /// The render origin of an eye over a lattice whose first sample lies at `origin` (x, z).
-    pub fn new(origin: [f64; 2], spacing: [f64; 2], eye: glam::DVec3) -> Self {
-        // It may lie far outside the field: i32 is clamped so that differences stay exact.
-        let at = [0, 1].map(|k| {
-            let at = (eye[2 * k] - origin[k]) / spacing[k];
-            at.round().clamp(-(2f64.powi(29)), 2f64.powi(29)) as i32
-        });
-        let relative = [0, 1].map(|k| (origin[k] + f64::from(at[k]) * spacing[k] - eye[2 * k]) as f32);
-        let height = eye.y as f32;
-        Self { at, relative, height, height_relative: (f64::from(height) - eye.y) as f32 }
-    }
-}
-
-impl Camera {
-    fn new(field: &Field, view: &View) -> Self {
-        let (slope, size) = match view.lens {
-            Lens::Perspective { .. } => (1.0 / view.focal_px(), 0.0),
-            Lens::Orthographic { .. } => (0.0, 1.0 / view.focal_px()),
-        };
-        Self {
-            clip_from_relative: view.clip_from_relative().as_mat4().to_cols_array_2d(),
-            origin: RenderOrigin::new(field.origin, field.spacing, view.eye),
-            pixel_slope: slope as f32,
-            pixel_size: size as f32,
-        }
-    }
-}
-
-impl HeightMap {
-    fn new(field: &Field, render_origin: [i32; 2]) -> Self {
-        let (zero, scale) = match *field.samples() {
-            Samples::F32(_) => (0.0, 1.0),
-            Samples::Coded { zero, scale, .. } => (zero, scale),
-        };
-        Self {
-            spacing: field.spacing.map(|s| s as f32),
-            last: field.size().map(|n| n as i32 - 1),
-            stored: field.stored().map(|n| n as i32),
-            origin_stored: [0, 1].map(|k| repeated(field, render_origin[k], k)),
-            zero,
-            scale,
-        }
-    }
-}
-
-impl Frame {
-    /// The parts of a frame that decide positions: camera and heights.
-    pub fn placing(field: &Field, view: &View) -> Frame {
-        let camera = Camera::new(field, view);
-        Frame { camera, heights: HeightMap::new(field, camera.origin.at), ..Frame::default() }
-    }
-
-    /// A frame for positions on the lattice alone, whose last sample is this one.
-    pub fn of_lattice(last: [i32; 2]) -> Frame {
-        Frame { heights: HeightMap { last, ..HeightMap::default() }, ..Frame::default() }
-    }
-
-    /// The same frame for explicit vertices whose positions have this many binary digits of a fraction of a sample.
-    pub fn with_fractions(self, bits: u32) -> Frame {
-        Frame { vertices: VertexFormat { fraction_bits: bits as i32, ..self.vertices }, ..self }
-    }
-}
-
-/// A position along an axis. Far positions on a tiled field are moved back by whole repetitions.
-fn repeated(field: &Field, at: i32, axis: usize) -> i32 {
-    const FAR: u32 = 4096;
-    if field.is_tiled() && at.unsigned_abs() > FAR { at % field.stored()[axis] as i32 } else { at }
-}
+pub use super::relative::relative_position;
 
 /// A lattice vertex at its drawn position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -298,37 +229,14 @@ pub fn explicit_height(instance: &Instance, vertex: &ExplicitVertex) -> f32 {
     morphed_height(vertex.height, morphed_height(vertex.target, vertex.second_target, second_target), weight)
 }
 
-/// Lattice position of an explicit vertex, in the units of [`VertexFormat::fraction_bits`].
+/// Lattice position of an explicit vertex, in the units of
+/// [`VertexFormat::fraction_bits`](super::layout::VertexFormat::fraction_bits).
 pub fn explicit_position(frame: &Frame, instance: &Instance, vertex: &ExplicitVertex) -> [i32; 2] {
     let turned = turned_position(instance, vertex.position);
     [0, 1].map(|k| {
         let origin = instance.origin[k] << frame.vertices.fraction_bits;
         (origin + scaled(instance, turned[k])).min(frame.heights.last[k] << frame.vertices.fraction_bits)
     })
-}
-
-/// Position relative to the eye (metres, world axes) from a position as [`explicit_position`] returns it and a height.
-pub fn relative_position(frame: &Frame, at: [i32; 2], height: f32) -> [f32; 3] {
-    let [x, z] = relative_to_eye(frame, from_render_origin(frame, at));
-    [x, (height - (frame.camera.origin.height - frame.vertices.height_base)) + frame.camera.origin.height_relative, z]
-}
-
-/// Offset from the render origin to a position, samples. Whole samples are exact however far the origin is.
-pub fn from_render_origin(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
-    let unit = 1 << frame.vertices.fraction_bits;
-    [0, 1].map(|k| {
-        let whole = (at[k] >> frame.vertices.fraction_bits) - frame.camera.origin.at[k];
-        whole as f32 + (at[k] & (unit - 1)) as f32 * (1.0 / unit as f32)
-    })
-}
-
-/// Offset from the eye to a lattice position in plan (x, z), metres.
-pub fn relative_plan(frame: &Frame, at: [i32; 2]) -> [f32; 2] {
-    relative_to_eye(frame, [0, 1].map(|k| (at[k] - frame.camera.origin.at[k]) as f32))
-}
-
-fn relative_to_eye(frame: &Frame, from_render_origin: [f32; 2]) -> [f32; 2] {
-    [0, 1].map(|k| from_render_origin[k] * frame.heights.spacing[k] + frame.camera.origin.relative[k])
 }
 
 /// Height between two shapes. Weight 0 gives the finer one and 1 the coarser one, both to the bit.

@@ -7,9 +7,8 @@
 //!
 //! Each quadrant morphs as a whole, sides included, and no vertex snaps to another: see [`SkirtWeights`].
 
-use super::Instance;
 pub use super::layout::SKIRT;
-use super::layout::{SKIRT_WEIGHTS, SkirtWeights};
+use super::layout::{Instance, SKIRT_WEIGHTS, SkirtWeights};
 
 /// A vertex of a mesh with skirts, after the turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

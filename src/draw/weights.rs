@@ -13,8 +13,7 @@
 //! outer side from weight `ONE` on, and on a seam with the flag [`STITCHED`]. Weights are integers, so that both meshes
 //! of a side agree to the bit.
 
-use super::Instance;
-use super::layout::{DISTANCE_WEIGHTS, FIRST_SIDE, LAST_SIDE, NO_LINE, SEAM, SKIRT_WEIGHTS, SLOT_WEIGHTS};
+use super::layout::{DISTANCE_WEIGHTS, FIRST_SIDE, Instance, LAST_SIDE, NO_LINE, SEAM, SKIRT_WEIGHTS, SLOT_WEIGHTS};
 pub use super::layout::{DistanceWeights, FINER, ONE, STITCHED, SkirtWeights, SlotWeights};
 
 /// The weights of an instance in one of their encodings.

@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::source::{Block, Coverage, HeightSource};
-use super::{Error, Field, Holes, Raster, Samples};
+use super::error::Error;
+use super::field::Field;
+use super::holes::Holes;
+use super::raster::Raster;
+use super::samples::Samples;
 
 /// Floor and ceiling of a cave, welded: at samples of rock both have the same height.
 ///
@@ -48,15 +51,14 @@ impl Cave {
         let [low, high] = [floor, ceiling].map(heights);
         let no_data = |k: usize| floor.holes().contains(k) || ceiling.holes().contains(k);
         let is_rock: Vec<bool> = (0..low.len()).map(|k| high[k] <= low[k] || no_data(k)).collect();
-        let between = meeting(floor, &low, &high, &is_rock);
+        let between = meeting(floor.stored(), &low, &high, &is_rock);
         let welded = |heights: Vec<f32>| {
             let height = |k: usize| if is_rock[k] { between.samples().height(k) } else { heights[k] };
             let samples = Samples::F32((0..heights.len()).map(height).collect());
             floor.source().with_raster(Raster::new(samples, floor.stored(), Holes::none(heights.len())))
         };
         let ceiling = Arc::new(floor.with_source(welded(high)));
-        let source = CaveFloor { floor: welded(low), ceiling: Arc::clone(&ceiling) };
-        Self { floor: Arc::new(floor.with_source(Arc::new(source))), ceiling }
+        Self { floor: Arc::new(floor.with_source(welded(low)).under(Arc::clone(&ceiling))), ceiling }
     }
 
     /// Returns the cave that a field is the floor of.
@@ -65,7 +67,7 @@ impl Cave {
         Some(Self { floor: Arc::clone(floor), ceiling })
     }
 
-    /// Returns the floor. Its source holds the ceiling, so that it stands for the cave wherever a field is needed.
+    /// Returns the floor. It holds the ceiling, so that it stands for the cave wherever a field is needed.
     pub fn floor(&self) -> &Arc<Field> {
         &self.floor
     }
@@ -82,60 +84,9 @@ impl Cave {
     }
 }
 
-/// The floor of a cave: any source, with a ceiling over it.
-#[derive(Clone, Debug)]
-pub struct CaveFloor {
-    floor: Arc<dyn HeightSource>,
-    ceiling: Arc<Field>,
-}
-
-impl HeightSource for CaveFloor {
-    fn size(&self) -> [u32; 2] {
-        self.floor.size()
-    }
-
-    fn height(&self, i: u32, j: u32) -> f32 {
-        self.floor.height(i, j)
-    }
-
-    fn is_hole(&self, i: u32, j: u32) -> bool {
-        self.floor.is_hole(i, j)
-    }
-
-    fn raster(&self) -> &Raster {
-        self.floor.raster()
-    }
-
-    fn coverage(&self) -> Coverage {
-        self.floor.coverage()
-    }
-
-    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
-        Arc::new(Self { floor: self.floor.with_raster(raster), ceiling: Arc::clone(&self.ceiling) })
-    }
-
-    fn read(&self, block: &Block, heights: &mut Vec<f32>) {
-        self.floor.read(block, heights);
-    }
-
-    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
-        self.floor.range_of(first, last)
-    }
-
-    fn range(&self) -> [f32; 2] {
-        let ([low, high], [over_low, over_high]) = (self.floor.range(), self.ceiling.range());
-        [low.min(over_low), high.max(over_high)]
-    }
-
-    fn ceiling(&self) -> Option<&Arc<Field>> {
-        Some(&self.ceiling)
-    }
-}
-
 /// Returns the surface along which floor and ceiling meet: half-way between them at rock beside the cave, filled in from
 /// there elsewhere.
-fn meeting(floor: &Field, low: &[f32], high: &[f32], is_rock: &[bool]) -> Raster {
-    let size = floor.stored();
+fn meeting(size: [u32; 2], low: &[f32], high: &[f32], is_rock: &[bool]) -> Raster {
     let [w, h] = size.map(|n| n as usize);
     let around = |n: usize, last: usize| n.saturating_sub(1)..=(n + 1).min(last);
     let is_beside = |k: usize| {

@@ -1,16 +1,11 @@
-//! The embedded terrain: 25.6 × 25.6 km of alpine landscape, made by [`super::synth`].
+//! The embedded terrain: 25.6 × 25.6 km of alpine landscape, made by [`super::synth`] (kind `eroded`, seed 2).
 //!
 //! `cargo test --release --no-default-features -- --ignored make_assets` writes both files again, byte for byte.
 
-use super::synth::Kind;
-use super::{Field, Holes, Samples};
+use super::field::Field;
+use super::holes::Holes;
+use super::samples::Samples;
 
-/// Kind of landscape that [`demo`] was synthesised from.
-pub const KIND: Kind = Kind::Eroded;
-/// See [`KIND`].
-pub const SIZE: [u32; 2] = [1025, 1025];
-/// See [`KIND`].
-pub const SEED: u64 = 2;
 /// Metres per code of the picture.
 pub const SCALE: f32 = 0.1;
 /// Distance of samples, metres.

@@ -8,8 +8,9 @@ use std::path::PathBuf;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
+use super::field::Field;
+use super::samples::Samples;
 use super::save::replace;
-use super::{Field, Samples};
 
 /// First bytes of a cache file; the digit grows when the content changes its meaning.
 const MAGIC: &[u8; 16] = b"cuesta kept 1\r\n\x1a";

@@ -6,8 +6,13 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::bezier::{self, Bezier};
+use super::holes::Holes;
+use super::procedural::Procedural;
+use super::raster::Raster;
+use super::samples::Samples;
 use super::source::{Block, Coverage, HeightSource};
-use super::{Holes, Procedural, Raster, Samples, Statistics, Tiled};
+use super::statistics::Statistics;
+use super::tiled::Tiled;
 
 /// A rectangular field of heights, at least 2 × 2 samples.
 ///
@@ -21,6 +26,8 @@ pub struct Field {
     raster: Raster,
     coverage: Coverage,
     size: [u32; 2],
+    /// The surface above the floor of a cave.
+    ceiling: Option<Arc<Field>>,
     /// Distance of neighbouring samples (x, z), metres.
     pub spacing: [f64; 2],
     /// World position of sample (0, 0) (x, z), metres.
@@ -52,12 +59,17 @@ impl Field {
     pub fn of(source: Arc<dyn HeightSource>, spacing: [f64; 2]) -> Self {
         assert!(spacing.iter().all(|s| s.is_finite() && *s > 0.0));
         let (raster, coverage, size) = (source.raster().clone(), source.coverage(), source.size());
-        Self { source, raster, coverage, size, spacing, origin: [0.0, 0.0], crs: None, file: None }
+        Self { source, raster, coverage, size, ceiling: None, spacing, origin: [0.0, 0.0], crs: None, file: None }
     }
 
-    /// Returns another source at the same place.
+    /// Returns another source at the same place, without a ceiling.
     pub(super) fn with_source(&self, source: Arc<dyn HeightSource>) -> Self {
         Self { origin: self.origin, crs: self.crs.clone(), ..Self::of(source, self.spacing) }
+    }
+
+    /// Returns the same field as the floor of a cave.
+    pub(super) fn under(self, ceiling: Arc<Field>) -> Self {
+        Self { ceiling: Some(ceiling), ..self }
     }
 
     /// Repeats the samples in memory `tiles` times along (x, z); sample (0, 0) follows the last one.
@@ -71,7 +83,7 @@ impl Field {
     }
 
     /// Returns the source of the heights.
-    pub fn source(&self) -> &Arc<dyn HeightSource> {
+    pub(super) fn source(&self) -> &Arc<dyn HeightSource> {
         &self.source
     }
 
@@ -103,12 +115,13 @@ impl Field {
 
     /// Returns the surface above, if this is the floor of a [cave](super::cave::Cave).
     pub fn ceiling(&self) -> Option<&Arc<Field>> {
-        self.source.ceiling()
+        self.ceiling.as_ref()
     }
 
     /// Returns the lowest and highest height, metres, holes excepted and a ceiling included.
     pub fn range(&self) -> [f32; 2] {
-        self.source.range()
+        let ([low, high], ceiling) = (self.source.range(), self.ceiling.as_ref().map(|ceiling| ceiling.range()));
+        ceiling.map_or([low, high], |[over_low, over_high]| [low.min(over_low), high.max(over_high)])
     }
 
     /// Returns the lowest and highest height, metres, of the samples between two lattice positions, both inclusive and
@@ -213,13 +226,14 @@ impl Field {
 
     /// Turns holes into data: they keep the heights filled in from around them.
     pub fn without_holes(self) -> Self {
-        let file = self.file.clone();
-        Self { file, ..self.with_source(self.source.with_raster(self.raster.without_holes())) }
+        let (file, ceiling) = (self.file.clone(), self.ceiling.clone());
+        Self { file, ceiling, ..self.with_source(self.source.with_raster(self.raster.without_holes())) }
     }
 
     /// Returns the same heights with data only at holes and at the samples next to them: everywhere that terrain may
     /// be missing.
     pub fn around_holes(&self) -> Field {
-        self.with_source(self.source.with_raster(self.raster.around_holes()))
+        let around = self.with_source(self.source.with_raster(self.raster.around_holes()));
+        Self { ceiling: self.ceiling.clone(), ..around }
     }
 }

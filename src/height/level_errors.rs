@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Field;
 use super::bounds::Bounds;
+use super::field::Field;
 use super::levels;
 
 /// Returns the largest error, metres, of any square of each level, cut ones at the end of a tiled field included.

@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
+use super::field::Field;
+use super::rtin;
 use super::surface::{self, Corner};
-use super::{Field, rtin};
 
 /// A rectangle of cells of one level.
 #[derive(Clone, Copy)]

@@ -3,9 +3,9 @@
 pub mod bezier;
 pub mod bounds;
 pub mod cave;
-mod cuts;
 pub mod demo;
 pub(crate) mod disk_cache;
+mod error;
 mod field;
 mod formats;
 mod georef;
@@ -20,10 +20,12 @@ pub mod rtin;
 mod samples;
 pub mod save;
 mod source;
+mod statistics;
 pub mod surface;
 pub mod synth;
 mod tiled;
 
+pub use error::Error;
 pub use field::Field;
 pub use formats::{
     Encoding, FORMATS, Footprint, Format, HoleFill, Loaded, Located, MAX_SIDE, Options, Order, RawLayout, SampleType,
@@ -32,32 +34,8 @@ pub use formats::{
 pub use georef::{Place, Unit, metres_per_degree};
 pub use holes::Holes;
 pub use procedural::Procedural;
-pub use raster::{Raster, Statistics};
+pub use raster::Raster;
 pub use samples::Samples;
 pub use source::{Block, Coverage, HeightSource};
+pub use statistics::Statistics;
 pub use tiled::Tiled;
-
-/// An error about a file or an option: the file, the field or position in it, what was expected and what was found.
-#[derive(Debug, thiserror::Error)]
-#[error("{file}: {place}: {what}")]
-pub struct Error {
-    /// The file's name as given.
-    pub file: String,
-    /// The header field, line, row or byte position at fault.
-    pub place: String,
-    /// The expected and the found content.
-    pub what: String,
-}
-
-impl Error {
-    /// Makes an error at a place of a file.
-    pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
-        Self { file: file.into(), place: place.into(), what: one_line(what.to_string()) }
-    }
-}
-
-/// Returns the text with spaces in place of line breaks and other control characters: decoders quote bytes of broken
-/// files.
-fn one_line(text: String) -> String {
-    if text.contains(char::is_control) { text.replace(char::is_control, " ") } else { text }
-}

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use super::bezier::{self, Bezier};
+use super::holes::Holes;
+use super::raster::Raster;
+use super::samples::Samples;
 use super::source::{Block, Coverage, HeightSource};
-use super::{Holes, Raster, Samples};
 
 /// Samples along a side of the preview.
 const PREVIEW: u32 = 257;

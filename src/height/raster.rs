@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::source::{Coverage, HeightSource};
-use super::{Holes, Samples};
+use super::holes::Holes;
+use super::samples::Samples;
+use super::statistics::Statistics;
 
 /// Samples in memory, row by row from the north-west corner. Clones share them.
 #[derive(Clone, Debug)]
@@ -11,17 +12,6 @@ pub struct Raster {
     samples: Arc<Samples>,
     holes: Arc<Holes>,
     size: [u32; 2],
-}
-
-/// Lowest, highest and mean height of the samples that are no holes, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Statistics {
-    /// Lowest.
-    pub min: f32,
-    /// Highest.
-    pub max: f32,
-    /// Mean.
-    pub mean: f64,
 }
 
 impl Raster {
@@ -35,6 +25,31 @@ impl Raster {
         let size = [x_count, z_count];
         fill_holes(&mut samples, &holes, size);
         Self { samples: Arc::new(samples), holes: Arc::new(holes), size }
+    }
+
+    /// Returns the number of samples along (x, z).
+    #[inline]
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Returns the height of sample `(i, j)`, metres.
+    #[inline]
+    pub fn height(&self, i: u32, j: u32) -> f32 {
+        self.samples.height(self.index(i, j))
+    }
+
+    /// Returns true if sample `(i, j)` has no data.
+    #[inline]
+    pub fn is_hole(&self, i: u32, j: u32) -> bool {
+        self.holes.count() > 0 && self.holes.contains(self.index(i, j))
+    }
+
+    /// Returns the lowest and highest height, metres, of the samples between two positions, both inclusive and holes
+    /// included.
+    pub fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
+        let rows = (first[1]..=last[1]).map(|j| self.row(j, [first[0], last[0]]));
+        rows.fold([f32::INFINITY, f32::NEG_INFINITY], |range, row| self.samples.range(row, range))
     }
 
     /// Returns the samples, row by row.
@@ -61,17 +76,7 @@ impl Raster {
 
     /// Returns the statistics of the samples that are no holes; zeros if all are holes.
     pub fn statistics(&self) -> Statistics {
-        let (mut min, mut max, mut sum, mut count) = (f32::INFINITY, f32::NEG_INFINITY, 0.0, 0u64);
-        for k in 0..self.samples.len() {
-            if self.holes.count() == 0 || !self.holes.contains(k) {
-                let h = self.samples.height(k);
-                (min, max, sum, count) = (min.min(h), max.max(h), sum + f64::from(h), count + 1);
-            }
-        }
-        match count {
-            0 => Statistics { min: 0.0, max: 0.0, mean: 0.0 },
-            _ => Statistics { min, max, mean: sum / count as f64 },
-        }
+        Statistics::of(&self.samples, &self.holes)
     }
 
     /// Returns the same samples without holes: those under holes keep the heights that were filled in.
@@ -91,40 +96,6 @@ impl Raster {
         let mut holes = Holes::none(self.samples.len());
         (0..self.samples.len()).filter(|&k| !near(k)).for_each(|k| holes.insert(k));
         Self { holes: Arc::new(holes), ..self.clone() }
-    }
-}
-
-impl HeightSource for Raster {
-    #[inline]
-    fn size(&self) -> [u32; 2] {
-        self.size
-    }
-
-    #[inline]
-    fn height(&self, i: u32, j: u32) -> f32 {
-        self.samples.height(self.index(i, j))
-    }
-
-    #[inline]
-    fn is_hole(&self, i: u32, j: u32) -> bool {
-        self.holes.count() > 0 && self.holes.contains(self.index(i, j))
-    }
-
-    fn raster(&self) -> &Raster {
-        self
-    }
-
-    fn coverage(&self) -> Coverage {
-        Coverage::Whole
-    }
-
-    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
-        Arc::new(raster)
-    }
-
-    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
-        let rows = (first[1]..=last[1]).map(|j| self.row(j, [first[0], last[0]]));
-        rows.fold([f32::INFINITY, f32::NEG_INFINITY], |range, row| self.samples.range(row, range))
     }
 }
 

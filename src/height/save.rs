@@ -7,8 +7,10 @@ use tiff::encoder::colortype::{ColorType, Gray32Float, GrayI16};
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, TiffKind, TiffValue};
 use tiff::tags::{Predictor, Tag};
 
+use super::error::Error;
+use super::field::Field;
 pub use super::replace::{Out, discard_unfinished, replace};
-use super::{Error, Field, Samples};
+use super::samples::Samples;
 
 /// Writes all samples of `field`, tiling included, in the format of the extension. On failure an existing file stays.
 ///

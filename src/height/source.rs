@@ -1,19 +1,18 @@
 //! Sources of heights: the trait that terrain implements, whatever its samples come from.
 //!
-//! A source is a lattice of heights in sample steps. It has no position: [`Field`] adds spacing, origin and coordinate
-//! system. Implementations: [`Raster`], [`Tiled`](super::Tiled), [`Procedural`](super::Procedural) and
-//! [`CaveFloor`](super::cave::CaveFloor).
+//! A source is a lattice of heights in sample steps. It has no position: [`Field`](super::Field) adds spacing, origin and
+//! coordinate system. Implementations: [`Raster`], [`Tiled`](super::Tiled) and [`Procedural`](super::Procedural).
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use super::bezier::Bezier;
-use super::{Field, Raster};
+use super::raster::Raster;
 
 /// A lattice of heights.
 ///
 /// A call through the trait costs more than a read of a sample in memory. Loops over single samples therefore go through
-/// [`Field`], which reads the raster directly where its [coverage](Self::coverage) allows; blocks go through
+/// [`Field`](super::Field), which reads the raster directly where its [coverage](Self::coverage) allows; blocks go through
 /// [`Self::read`] and [`Self::range_of`].
 pub trait HeightSource: Debug + Send + Sync {
     /// Returns the number of samples along (x, z), each at least 2.
@@ -58,10 +57,35 @@ pub trait HeightSource: Debug + Send + Sync {
     fn procedural(&self) -> Option<&Arc<Bezier>> {
         None
     }
+}
 
-    /// Returns the surface above, if this is the floor of a [cave](super::cave::Cave).
-    fn ceiling(&self) -> Option<&Arc<Field>> {
-        None
+impl HeightSource for Raster {
+    fn size(&self) -> [u32; 2] {
+        self.size()
+    }
+
+    fn height(&self, i: u32, j: u32) -> f32 {
+        self.height(i, j)
+    }
+
+    fn is_hole(&self, i: u32, j: u32) -> bool {
+        self.is_hole(i, j)
+    }
+
+    fn raster(&self) -> &Raster {
+        self
+    }
+
+    fn coverage(&self) -> Coverage {
+        Coverage::Whole
+    }
+
+    fn with_raster(&self, raster: Raster) -> Arc<dyn HeightSource> {
+        Arc::new(raster)
+    }
+
+    fn range_of(&self, first: [u32; 2], last: [u32; 2]) -> [f32; 2] {
+        self.range_of(first, last)
     }
 }
 
@@ -97,7 +121,7 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::height::{Holes, Procedural, Samples, Tiled, bezier};
+    use crate::height::{Field, Holes, Procedural, Samples, Tiled, bezier};
 
     /// A raster of floats, the same as codes, a tiled one and evaluated heights.
     fn sources() -> Vec<Arc<dyn HeightSource>> {

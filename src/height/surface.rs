@@ -6,7 +6,8 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Field, rtin};
+use super::field::Field;
+use super::rtin;
 
 /// A corner of a drawn triangle: lattice position and height, metres. Positions count samples, or 2^−bits samples where
 /// a number of *fraction bits* is given.

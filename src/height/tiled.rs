@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Raster;
+use super::raster::Raster;
 use super::source::{Coverage, HeightSource};
 
 /// A raster repeated `tiles` times along (x, z); sample (0, 0) follows the last one.

@@ -1,6 +1,10 @@
 //! The one place where plans are made.
 
-use super::{Colour, DeviceLimits, Look, ScenePlan, page_shift};
+use super::colour::Colour;
+use super::device_limits::DeviceLimits;
+use super::look::Look;
+use super::pages::page_shift;
+use super::scene_plan::ScenePlan;
 use crate::draw::PipelineRequirements;
 use crate::height::{Field, Samples};
 use crate::texture::virtual_ground::VirtualGroundLayout;

@@ -1,15 +1,9 @@
 //! Features that are kept or omitted by hand, to measure their cost.
 
 use super::features::{FEATURES, Feature, Force};
-
-/// The set of forced features; empty by default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Forced {
-    /// Bit k: feature k of [`FEATURES`] is kept.
-    kept: u32,
-    /// Bit k: feature k is omitted.
-    left_out: u32,
-}
+use super::forced_set::Forced;
+use super::scene_plan::ScenePlan;
+use crate::draw::PipelineRequirements;
 
 /// A feature's name on the command line.
 pub fn word(feature: &Feature) -> String {
@@ -35,23 +29,45 @@ impl Forced {
             let how = if keep { "kept" } else { "left out" };
             return Err(format!("{name}: it cannot be {how} by hand: {why}"));
         }
-        let bit = 1 << k;
-        if (self.kept | self.left_out) & bit != 0 {
-            return Err(format!("{name}: forced twice"));
-        }
-        Ok(if keep { Self { kept: self.kept | bit, ..self } } else { Self { left_out: self.left_out | bit, ..self } })
+        self.and(k, keep).ok_or_else(|| format!("{name}: forced twice"))
     }
 
     /// Each forced feature, with true if it is kept.
     pub(super) fn each(self) -> impl Iterator<Item = (&'static Feature, bool)> {
-        let is = |bits: u32, k: usize| bits >> k & 1 == 1;
-        let state = move |k: usize| if is(self.kept, k) { Some(true) } else { is(self.left_out, k).then_some(false) };
-        FEATURES.iter().enumerate().filter_map(move |(k, feature)| Some((feature, state(k)?)))
+        FEATURES.iter().enumerate().filter_map(move |(k, feature)| Some((feature, self.state(k)?)))
     }
 
     /// Returns true if this feature is forced.
     pub(super) fn has(self, feature: &Feature) -> bool {
         self.each().any(|(forced, _)| forced.name == feature.name)
+    }
+}
+
+impl ScenePlan {
+    /// The plan of the same scene for another technique.
+    pub fn with_requirements(&self, requirements: PipelineRequirements) -> Self {
+        let mut plan = Self { requirements, draws: requirements.draws, ..self.clone() };
+        plan.force();
+        plan
+    }
+
+    /// Keeps and omits the forced features.
+    pub(super) fn force(&mut self) {
+        for (feature, keep) in self.forced.each() {
+            feature.force(self, keep);
+        }
+    }
+
+    /// The plan with one more feature, named by its [`word`], whether the scene needs it or not.
+    ///
+    /// # Errors
+    /// If there is no such feature, or it cannot be forced.
+    pub fn keeping(&self, name: &str) -> Result<Self, String> {
+        let mut plan = self.clone();
+        for (feature, keep) in Forced::default().with(name, true)?.each() {
+            feature.force(&mut plan, keep);
+        }
+        Ok(plan)
     }
 }
 

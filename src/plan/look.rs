@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::colour::Colour;
-use super::features::overlay_bytes;
-use super::forced::Forced;
+use super::forced_set::Forced;
+use super::mipmaps::overlay_bytes;
 use crate::draw::layout::{Frame, Lighting, SurfaceTextures};
 use crate::height::Field;
 use crate::texture::drape::Drape;

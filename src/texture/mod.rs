@@ -6,7 +6,6 @@ pub mod detail;
 pub mod drape;
 pub mod ground;
 pub mod hidden;
-pub mod mip_spheres;
 pub mod mipmaps;
 mod noise;
 pub mod overlay_pyramid;

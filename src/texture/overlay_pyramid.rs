@@ -31,15 +31,6 @@ pub struct PyramidLayout {
     pub repeats: [bool; 2],
 }
 
-/// One mip level of one page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PageMip {
-    /// Page indices (x, z).
-    pub page: [u32; 2],
-    /// Mip level, 0 the finest.
-    pub level: u32,
-}
-
 /// One mip level of all pages in one image.
 struct MipLevel {
     size: [u32; 2],
@@ -48,7 +39,6 @@ struct MipLevel {
 
 /// All mip levels of all pages.
 pub struct OverlayPyramid {
-    layout: PyramidLayout,
     levels: Vec<MipLevel>,
 }
 
@@ -72,12 +62,7 @@ impl OverlayPyramid {
         for _ in 0..cells.ilog2() {
             levels.extend(levels.last().map(|finer| finer.halved(layout.repeats)));
         }
-        Self { layout, levels }
-    }
-
-    /// Returns the grid of pages.
-    pub fn layout(&self) -> &PyramidLayout {
-        &self.layout
+        Self { levels }
     }
 
     /// Returns the number of mip levels of a page. The coarsest is one cell, or 2 × 2 texels.
@@ -93,23 +78,6 @@ impl OverlayPyramid {
     /// Returns the cells along a side of a page at a mip level.
     fn cells(&self, level: u32) -> u32 {
         1 << (self.levels() - 1 - level)
-    }
-
-    /// Returns the bytes of a page at a mip level.
-    pub fn bytes(&self, level: u32) -> u64 {
-        u64::from(self.side(level)).pow(2) * size_of::<Texel>() as u64
-    }
-
-    /// Returns the texels of a page at a mip level, row by row.
-    ///
-    /// # Panics
-    /// If there is no such page or level.
-    pub fn page_texels(&self, PageMip { page, level }: PageMip) -> Vec<Texel> {
-        assert!((0..2).all(|k| page[k] < self.layout.pages[k]), "page {page:?}");
-        let (of, side) = (&self.levels[level as usize], self.side(level) as usize);
-        let [x, z] = page.map(|n| (n * self.cells(level)) as usize);
-        let row = |j: usize| (z + j) * of.size[0] as usize + x;
-        (0..side).flat_map(|j| &of.texels[row(j)..row(j) + side]).copied().collect()
     }
 
     /// Returns a tile of constant size at a mip level: `side(0)`² texels, which cover 2^level × 2^level pages. `at`
@@ -214,6 +182,15 @@ mod tests {
         PyramidLayout { pages, extent: pages.map(f64::from), repeats: [repeats; 2] }
     }
 
+    /// Returns the texels of a page at a mip level, row by row.
+    fn page_texels(pyramid: &OverlayPyramid, page: [u32; 2], level: u32) -> Vec<Texel> {
+        let (of, side) = (&pyramid.levels[level as usize], pyramid.side(level) as usize);
+        assert!((0..2).all(|k| page[k] < (of.size[k] - 1) / pyramid.cells(level)), "page {page:?}");
+        let [x, z] = page.map(|n| (n * pyramid.cells(level)) as usize);
+        let row = |j: usize| (z + j) * of.size[0] as usize + x;
+        (0..side).flat_map(|j| &of.texels[row(j)..row(j) + side]).copied().collect()
+    }
+
     fn column(texels: &[Texel], side: u32, n: u32) -> Vec<Texel> {
         texels.iter().skip(n as usize).step_by(side as usize).copied().collect()
     }
@@ -232,14 +209,14 @@ mod tests {
             for level in 0..pyramid.levels() {
                 let side = pyramid.side(level);
                 for (x, z) in (0..4).flat_map(|x| (0..3).map(move |z| (x, z))) {
-                    let own = pyramid.page_texels(PageMip { page: [x, z], level });
-                    assert_eq!(own.len() as u64 * 4, pyramid.bytes(level));
+                    let own = page_texels(&pyramid, [x, z], level);
+                    assert_eq!(own.len(), side.pow(2) as usize);
                     if x < last[0] {
-                        let east = pyramid.page_texels(PageMip { page: [(x + 1) % 4, z], level });
+                        let east = page_texels(&pyramid, [(x + 1) % 4, z], level);
                         assert_eq!(column(&own, side, side - 1), column(&east, side, 0), "{x}, {z} at {level}");
                     }
                     if z < last[1] {
-                        let south = pyramid.page_texels(PageMip { page: [x, (z + 1) % 3], level });
+                        let south = page_texels(&pyramid, [x, (z + 1) % 3], level);
                         assert_eq!(row(&own, side, side - 1), row(&south, side, 0), "{x}, {z} at {level}");
                     }
                 }
@@ -253,10 +230,9 @@ mod tests {
         for repeats in [false, true] {
             let (one, many) = (pyramid([64, 64], whole([1, 1], repeats)), pyramid([64, 64], whole([4, 4], repeats)));
             for level in 0..many.levels() {
-                let (whole, cells, side) =
-                    (one.page_texels(PageMip { page: [0, 0], level }), many.cells(level), one.side(level));
+                let (whole, cells, side) = (page_texels(&one, [0, 0], level), many.cells(level), one.side(level));
                 for page in (0..16).map(|k| [k % 4, k / 4]) {
-                    let mip = many.page_texels(PageMip { page, level });
+                    let mip = page_texels(&many, page, level);
                     let around = |n: u32| [page[0] * cells + n % (cells + 1), page[1] * cells + n / (cells + 1)];
                     let expected = (0..mip.len() as u32).map(around).map(|[x, z]| whole[(z * side + x) as usize]);
                     assert!(expected.eq(mip), "page {page:?} at level {level}");
@@ -279,7 +255,7 @@ mod tests {
                     if at[1] >= 3 {
                         continue;
                     }
-                    let mip = pyramid.page_texels(PageMip { page: at, level });
+                    let mip = page_texels(&pyramid, at, level);
                     let of_tile = |n: usize| {
                         let (i, j) = (n as u32 % (cells + 1), n as u32 / (cells + 1));
                         tile[((page[1] * cells + j) * side + page[0] * cells + i) as usize]
@@ -303,7 +279,7 @@ mod tests {
         }
         let pyramid = OverlayPyramid::new(Picture { size: [64, 64], texels: &texels }, whole([2, 2], false));
         for level in 1..4 {
-            let west = pyramid.page_texels(PageMip { page: [0, 0], level });
+            let west = page_texels(&pyramid, [0, 0], level);
             let at = column(&west, pyramid.side(level), pyramid.side(level) - 1);
             assert!(at.iter().all(|texel| texel[0] > 40), "level {level}: {at:?}");
         }

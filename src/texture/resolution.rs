@@ -1,5 +1,4 @@
-//! Computes the texture level a triangle needs, from the logarithm of its screen area or from the exponent of the
-//! float that holds it.
+//! Computes the texture level a triangle needs, from the exponent of the float that holds its screen area.
 //!
 //! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), §3 and §4. A square texture of level n has 4^n
 //! texels. A triangle of level l of a binary triangle tree covers 2^−(l+1) of its root square. If its screen area is
@@ -12,13 +11,8 @@ pub fn texture_area(level: i32) -> f64 {
 }
 
 /// Returns the level α of the root square's texture for a triangle of level `triangle_level` with a screen area of
-/// `texels`: ⌈½ log2(texels·2^(l+1))⌉ (§4.3, before its last step).
-pub fn level_by_logarithm(texels: f32, triangle_level: u32) -> i32 {
-    (0.5 * (f64::from(texels).log2() + f64::from(triangle_level + 1))).ceil() as i32
-}
-
-/// Returns the same level without a logarithm: (l + x + 3) >> 1 with texels = m·2^x, 1 ≤ m < 2 (§4.3). For m = 1 and
-/// even l + x + 1 the result is one level finer.
+/// `texels`, without a logarithm: (l + x + 3) >> 1 with texels = m·2^x, 1 ≤ m < 2 (§4.3). For m = 1 and even l + x + 1
+/// the result is one level finer.
 ///
 /// `texels` must be positive and finite; subnormal values are allowed.
 #[inline]
@@ -34,10 +28,15 @@ pub fn exponent(value: f32) -> i32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use rayon::prelude::*;
 
     use super::*;
+
+    /// Returns the level α of a triangle from its definition: ⌈½ log2(texels·2^(l+1))⌉ (§4.3, before its last step).
+    pub fn level_by_logarithm(texels: f32, triangle_level: u32) -> i32 {
+        (0.5 * (f64::from(texels).log2() + f64::from(triangle_level + 1))).ceil() as i32
+    }
 
     /// Bit patterns of all positive finite floats.
     const PATTERNS: std::ops::Range<u32> = 1..0x7f80_0000;

@@ -17,7 +17,7 @@ use super::pieces::Clipper;
 use super::tile_cache::{TileCache, TileUpload};
 use super::virtual_overlay::VirtualTextureStats;
 use super::wedges::{self, WedgeTriangle, root_side};
-use super::working_set::{Stop, TileId, WorkingSet};
+use super::working_set::{TileId, WorkingSet};
 use crate::draw::{DrawList, Geometry};
 use crate::height::Field;
 use crate::view::View;
@@ -96,7 +96,7 @@ pub struct GroundSet {
 impl GroundSet {
     /// Creates an empty set.
     pub fn new(layout: VirtualGroundLayout) -> Self {
-        Self { layout, set: WorkingSet::new(layout.texture_level(), Stop::Largest(TILE_LEVEL)), quality: 1.0 }
+        Self { layout, set: WorkingSet::new(layout.texture_level(), TILE_LEVEL), quality: 1.0 }
     }
 
     /// Finds the tiles that wedges need at one texel per pixel, or at a lower density at which they fit the cache.

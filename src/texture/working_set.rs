@@ -2,10 +2,9 @@
 //!
 //! After J. Blow, "Terrain Rendering at High Levels of Detail" (2000), part I. A wedge of a binary triangle tree
 //! needs the virtual texture at a level α of the root square, from its screen area
-//! ([`resolution`](super::resolution)). It is assigned the quadtree tile around it at which that is a texture of an
-//! acceptable size ([`Stop`]). Each need is stored with the interval of areas for which it holds, and moves by one
-//! level when the area leaves the interval (§4.1, §4.2). The set contains only tiles that a wedge of the last frame
-//! needs.
+//! ([`resolution`](super::resolution)). It is assigned the coarsest quadtree tile around it whose texture is of at most
+//! a given level (§3.3). Each need is stored with the interval of areas for which it holds, and moves by one level when
+//! the area leaves the interval (§4.1, §4.2). The set contains only tiles that a wedge of the last frame needs.
 //!
 //! **Errata**: the lower end of the interval is `Texture_Area(α − 1)` (§4.2 prints its inverse). A quadtree level is
 //! two levels of the binary tree. The descent therefore ends at ⌊l/2⌋ and lowers α by 1 at each step; this agrees
@@ -31,19 +30,6 @@ pub struct Wedge {
     pub level: u32,
     /// Barycentre in the root square, 0 to 1.
     pub barycentre: [f64; 2],
-}
-
-/// Rule that chooses one of the tiles around a wedge (§3.3). Levels are texture levels of a tile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stop {
-    /// The coarsest tile whose texture is of this level or lower: fewest textures.
-    Largest(i32),
-    /// As `Largest`, but a tile already in the set at the needed resolution is preferred: fewest new textures as the
-    /// viewpoint moves.
-    Generated(i32),
-    /// The root if its texture is of this level or lower, otherwise the smallest tile around the wedge: for textures
-    /// prepared in advance at the top and the bottom of the quadtree.
-    Ends(i32),
 }
 
 /// The texture that a wedge needs.
@@ -74,7 +60,8 @@ pub enum Change {
 /// The needs of a frame's wedges and the tiles that satisfy them.
 #[derive(Debug)]
 pub struct WorkingSet {
-    stop: Stop,
+    /// Largest level of a tile's texture.
+    max: i32,
     /// Level of the whole virtual texture; 18 is 2^36 texels.
     texture_level: i32,
     needs: HashMap<u64, Need>,
@@ -115,9 +102,10 @@ impl Wedge {
 }
 
 impl WorkingSet {
-    /// Creates an empty set for a virtual texture of 4^`texture_level` texels.
-    pub fn new(texture_level: i32, stop: Stop) -> Self {
-        Self { stop, texture_level, needs: HashMap::new(), tiles: HashMap::new(), texels: 0.0, frame: 0 }
+    /// Creates an empty set for a virtual texture of 4^`texture_level` texels. Tiles have textures of at most 4^`max`
+    /// texels, unless the smallest tile around a wedge needs more.
+    pub fn new(texture_level: i32, max: i32) -> Self {
+        Self { max, texture_level, needs: HashMap::new(), tiles: HashMap::new(), texels: 0.0, frame: 0 }
     }
 
     /// Begins a frame.
@@ -197,17 +185,9 @@ impl WorkingSet {
         (alpha.min(self.texture_level) - tile.level as i32).max(0) as usize
     }
 
+    /// Returns the coarsest tile around a wedge whose texture is of at most the largest level.
     fn choose(&self, wedge: &Wedge, alpha: i32) -> TileId {
-        let first_up_to = |max: i32| wedge.tile(((alpha - max).max(0) as u32).min(wedge.deepest_level()));
-        match self.stop {
-            Stop::Largest(max) => first_up_to(max),
-            Stop::Ends(max) => wedge.tile(if alpha <= max { 0 } else { wedge.deepest_level() }),
-            Stop::Generated(max) => {
-                let is_resident = |tile: &TileId| self.resolution(*tile) >= Some(self.own_level(*tile, alpha) as u32);
-                let around = (0..=wedge.deepest_level()).map(|level| wedge.tile(level));
-                around.into_iter().find(is_resident).unwrap_or_else(|| first_up_to(max))
-            }
-        }
+        wedge.tile(((alpha - self.max).max(0) as u32).min(wedge.deepest_level()))
     }
 
     /// Returns the level of a tile's texture; `None` if the tile is not in the set.
@@ -249,11 +229,6 @@ impl WorkingSet {
     pub fn tiles(&self) -> impl Iterator<Item = (TileId, u32)> {
         self.tiles.iter().map(|(&tile, counts)| (tile, counts.len() as u32 - 1))
     }
-
-    /// Returns the need of the wedge with a key.
-    pub fn need(&self, key: u64) -> Option<&Need> {
-        self.needs.get(&key)
-    }
 }
 
 /// Returns the screen areas, texels, for which a wedge of a level needs level α of the root square's texture.
@@ -265,44 +240,42 @@ fn interval(alpha: i32, wedge_level: u32) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::texture::resolution::level_by_logarithm;
+    use crate::texture::resolution::tests::level_by_logarithm;
 
     /// Wedges with random areas: stored needs equal those computed anew, and tiles and texels match the needs.
     #[test]
     fn incremental_needs_equal_needs_computed_anew() {
         let mut dice = fastrand::Rng::with_seed(5);
-        for stop in [Stop::Largest(6), Stop::Ends(4), Stop::Generated(6)] {
-            let mut set = WorkingSet::new(18, stop);
-            let wedges: Vec<_> =
-                (0..300).map(|_| Wedge { level: dice.u32(0..24), barycentre: [dice.f64(), dice.f64()] }).collect();
-            let mut areas: Vec<f32> = wedges.iter().map(|_| 10f32.powf(4.0 * dice.f32() - 1.0)).collect();
-            let mut changes = [0; 4];
-            for _ in 0..200 {
-                set.begin();
-                for (key, (wedge, area)) in wedges.iter().zip(&mut areas).enumerate().filter(|(key, _)| key % 7 != 3) {
-                    *area *= 1.3f32.powf(2.0 * dice.f32() - 1.0);
-                    let (is_hidden, is_near) = (dice.f32() < 0.05, dice.f32() < 0.02);
-                    let shown = if is_hidden { -*area } else { *area };
-                    let change = set.require(key as u64, wedge, shown, is_near);
-                    changes[change as usize] += 1;
-                    if let Some(need) = set.need(key as u64).filter(|_| !is_hidden || is_near) {
-                        let alpha = if is_near { 18 } else { level_by_logarithm(*area, wedge.level) };
-                        assert_eq!(need.alpha, alpha, "{wedge:?} with {area}");
-                        assert_eq!(need.tile, wedge.tile(need.tile.level));
-                        assert!(need.tile.level <= wedge.deepest_level());
-                        let own = need.alpha.min(18) - need.tile.level as i32;
-                        assert!(set.resolution(need.tile).is_some_and(|level| level as i32 >= own));
-                    }
-                }
-                set.end();
-                let texels: f64 = set.tiles().map(|(_, level)| texture_area(level as i32)).sum();
-                assert_eq!(set.texels(), texels);
-                for (tile, level) in set.tiles() {
-                    let needs = set.needs.values().filter(|need| need.tile == tile);
-                    assert_eq!(needs.map(|need| set.own_level(tile, need.alpha)).max(), Some(level as usize));
+        let mut set = WorkingSet::new(18, 6);
+        let wedges: Vec<_> =
+            (0..300).map(|_| Wedge { level: dice.u32(0..24), barycentre: [dice.f64(), dice.f64()] }).collect();
+        let mut areas: Vec<f32> = wedges.iter().map(|_| 10f32.powf(4.0 * dice.f32() - 1.0)).collect();
+        let mut changes = [0; 4];
+        for _ in 0..200 {
+            set.begin();
+            for (key, (wedge, area)) in wedges.iter().zip(&mut areas).enumerate().filter(|(key, _)| key % 7 != 3) {
+                *area *= 1.3f32.powf(2.0 * dice.f32() - 1.0);
+                let (is_hidden, is_near) = (dice.f32() < 0.05, dice.f32() < 0.02);
+                let shown = if is_hidden { -*area } else { *area };
+                let change = set.require(key as u64, wedge, shown, is_near);
+                changes[change as usize] += 1;
+                if let Some(need) = set.needs.get(&(key as u64)).filter(|_| !is_hidden || is_near) {
+                    let alpha = if is_near { 18 } else { level_by_logarithm(*area, wedge.level) };
+                    assert_eq!(need.alpha, alpha, "{wedge:?} with {area}");
+                    assert_eq!(need.tile, wedge.tile(need.tile.level));
+                    assert!(need.tile.level <= wedge.deepest_level());
+                    let own = need.alpha.min(18) - need.tile.level as i32;
+                    assert!(set.resolution(need.tile).is_some_and(|level| level as i32 >= own));
                 }
             }
-            assert!(changes.iter().all(|&n| n > 50), "{changes:?}");
+            set.end();
+            let texels: f64 = set.tiles().map(|(_, level)| texture_area(level as i32)).sum();
+            assert_eq!(set.texels(), texels);
+            for (tile, level) in set.tiles() {
+                let needs = set.needs.values().filter(|need| need.tile == tile);
+                assert_eq!(needs.map(|need| set.own_level(tile, need.alpha)).max(), Some(level as usize));
+            }
         }
+        assert!(changes.iter().all(|&n| n > 50), "{changes:?}");
     }
 }

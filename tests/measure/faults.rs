@@ -9,6 +9,7 @@ use cuesta::internal::measure::watertight::{self, CounterExample, Kind};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 
 use super::{drawn, plan, select, technique};
+use crate::synth::assets::{KIND, SEED};
 
 struct Scene {
     field: Arc<Field>,
@@ -18,7 +19,7 @@ struct Scene {
 
 /// Land of the demo's kind in a view that takes blocks of several levels.
 fn scene() -> Scene {
-    let mut field = synth::synth(demo::KIND, [257, 257], demo::SEED);
+    let mut field = synth::synth(KIND, [257, 257], SEED);
     field.spacing = [demo::SPACING; 2];
     let field = Arc::new(field);
     let eye = field.world_at(20.0, 230.0, f64::from(field.statistics().max) + 200.0);

@@ -2,11 +2,19 @@
 
 use std::path::Path;
 
-use cuesta::internal::height::demo::{KIND, OVERLAY, SEED, SIZE, demo};
+use cuesta::internal::height::demo::{OVERLAY, demo};
 use cuesta::internal::height::save::save;
-use cuesta::internal::height::synth::overlay::overlay;
-use cuesta::internal::height::synth::synth;
+use cuesta::internal::height::synth::{Kind, synth};
 use image::codecs::jpeg::JpegEncoder;
+
+use super::overlay::overlay;
+
+/// Kind of landscape that the embedded terrain was synthesised from.
+pub const KIND: Kind = Kind::Eroded;
+/// Samples along (x, z).
+const SIZE: [u32; 2] = [1025, 1025];
+/// See [`KIND`].
+pub const SEED: u64 = 2;
 
 #[test]
 #[ignore = "writes assets/"]

@@ -1,5 +1,6 @@
 //! Synthetic fields: bytes that never change, and the files they are saved to.
 
-mod assets;
+pub mod assets;
 mod fields;
+mod overlay;
 mod save;

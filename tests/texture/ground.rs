@@ -11,6 +11,7 @@ use cuesta::internal::texture::virtual_overlay::VirtualTextureStats;
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::DVec3;
 
+use super::page_table::find;
 use crate::prepared;
 
 const SIZE: [u32; 2] = [640, 360];
@@ -49,7 +50,7 @@ fn settle(ground: &mut VirtualGround, technique: &mut dyn Technique, view: &View
             break;
         }
     }
-    let levels = (0..4096).map(|k| ground.table().find([(k % 64) << 26, (k / 64) << 26]).0);
+    let levels = (0..4096).map(|k| find(ground.table().words(), [(k % 64) << 26, (k / 64) << 26]).0);
     (ground.stats(), levels.collect())
 }
 

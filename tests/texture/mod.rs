@@ -1,8 +1,8 @@
-//! Tests of the texture working set along a flight: its size, and the agreement of mip spheres with projected areas.
+//! Tests of the texture working set along a flight: its size.
 
 mod ground;
+mod page_table;
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use cuesta::internal::draw::DrawList;
@@ -12,11 +12,10 @@ use cuesta::internal::height::synth::{self, Kind};
 use cuesta::internal::height::{Field, surface};
 use cuesta::internal::lod::Technique;
 use cuesta::internal::texture::hidden::Depths;
-use cuesta::internal::texture::mip_spheres::MipSpheres;
 use cuesta::internal::texture::pieces::{ClipPlanes, Clipper, Corner};
 use cuesta::internal::texture::resolution::{level_by_exponent, texture_area};
 use cuesta::internal::texture::wedges;
-use cuesta::internal::texture::working_set::{Stop, Wedge, WorkingSet};
+use cuesta::internal::texture::working_set::{Wedge, WorkingSet};
 use cuesta::internal::view::{Lens, Metric, Tolerance, View};
 use glam::{DVec2, DVec3};
 
@@ -86,7 +85,7 @@ impl Flight {
         let mut list = DrawList::default();
         self.technique.select(view, &mut list);
         let wedges = wedges::from_draw_list(&self.field, view, self.technique.resident(), &list);
-        let mut set = WorkingSet::new(TEXTURE_LEVEL, Stop::Largest(TILE_LEVEL));
+        let mut set = WorkingSet::new(TEXTURE_LEVEL, TILE_LEVEL);
         wedges::update(&mut set, view, Clipper::new(view, 1.0, TEXTURE_LEVEL, TILE_LEVEL), &wedges);
         set
     }
@@ -172,8 +171,7 @@ struct Variant {
 
 impl Variant {
     fn new(name: &str, tile_level: i32, configure: Option<fn(Clipper) -> Clipper>) -> Self {
-        let (name, set) =
-            (format!("{name}, 4^{tile_level}"), WorkingSet::new(TEXTURE_LEVEL, Stop::Largest(tile_level)));
+        let (name, set) = (format!("{name}, 4^{tile_level}"), WorkingSet::new(TEXTURE_LEVEL, tile_level));
         Self { name, set, configure, tile_level, omits_hidden: false, frames: Vec::new() }
     }
 
@@ -259,33 +257,4 @@ fn the_working_set_is_bounded_by_the_screen_size() {
     assert!(published.max() > 4.0 * slots.max(), "the published rules need more");
     // A lower bound: most of the image is terrain, which needs about one texel per pixel.
     assert!(slots.frames.iter().all(|frame| frame[0] > 0.5 * SCREEN));
-}
-
-/// Mip spheres (the second method of the lecture) give the level of the projected area or an adjacent one.
-#[test]
-fn mip_spheres_agree_with_areas_within_one_level() {
-    let mut flight = Flight::new();
-    let mut set = WorkingSet::new(TEXTURE_LEVEL, Stop::Ends(5));
-    let (mut apart, mut levels) = ([0usize; 3], HashMap::<u64, i32>::new());
-    for frame in (0..FRAMES).step_by(4) {
-        let view = flight.view(frame, 20.0);
-        let seen = flight.visible_wedges(&view);
-        set.begin();
-        let mut followed = HashMap::new();
-        for s in seen.iter().filter(|s| !s.is_near && s.area_px > 0.0) {
-            set.require(s.key, &s.wedge, s.area_px as f32, false);
-            let corners = s.corners.map(|corner| corner.world);
-            let spheres = MipSpheres::new(corners, s.wedge.level, view.focal_px(), 1.0).expect("a triangle");
-            let level = spheres.follow(levels.get(&s.key).copied().unwrap_or(10), view.eye);
-            followed.insert(s.key, level);
-            if s.cosine > 0.03 {
-                let alpha = set.need(s.key).expect("required in this frame").alpha;
-                apart[(level - alpha).unsigned_abs().min(2) as usize] += 1;
-            }
-        }
-        set.end();
-        levels = followed;
-    }
-    println!("wedges that differ by 0, 1, more levels: {apart:?}");
-    assert!(apart[2] * 100_000 < apart[0] && apart[1] < apart[0], "{apart:?}");
 }

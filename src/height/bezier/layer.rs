@@ -3,7 +3,7 @@
 //! Neighbouring patches share their control points as those of a uniform cubic B-spline do: the surface has continuous
 //! second derivatives. In a patch that is the Bézier form with control points ((c₀ + 4c₁ + c₂)/6, (2c₁ + c₂)/3, …).
 
-use super::Area;
+use super::area::Area;
 use crate::height::synth::noise;
 
 /// Most patches along an axis of an area that are bounded one by one; larger areas get the range of all control points.

@@ -10,16 +10,19 @@
 //! Bounds of an area are within those of any area around it. Heights are the same on every machine: + − × ÷ and floor of
 //! f64.
 
+mod area;
 pub mod layer;
 
 use self::layer::{Layer, Ranges};
+
+pub use self::area::Area;
 
 /// Side of the terrain, metres.
 pub const SIDE_M: f64 = 524_288.0;
 /// Smallest distance of vertices, metres.
 pub const SPACING_M: f64 = 1.0 / 1024.0;
 /// Lattice positions along a side, [`SPACING_M`] apart.
-pub const LATTICE: u32 = (1 << 29) + 1;
+pub const LATTICE: u32 = (SIDE_M / SPACING_M) as u32 + 1;
 /// Number of displacement layers whose patches are at least 2 lattice steps wide.
 pub const LAYERS: u32 = 24;
 /// Width of the large patches, and heights of their control points, metres.
@@ -36,15 +39,6 @@ const ROUGHNESS_M: f64 = 131_072.0;
 
 /// Most layers of displacement: f64 positions do not resolve the patches of further ones.
 pub const MAX_LAYERS: u32 = 40;
-
-/// A rectangle of the plane, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Area {
-    /// Smallest corner.
-    pub min: [f64; 2],
-    /// Largest corner.
-    pub max: [f64; 2],
-}
 
 /// Procedural terrain.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,13 +111,6 @@ impl Bezier {
     pub fn range_m(&self) -> [f64; 2] {
         let max: f64 = self.displacement.iter().map(|layer| layer.ends()[1] * ROUGHNESS[1]).sum();
         [RELIEF_M[0] - max, RELIEF_M[1] + max]
-    }
-}
-
-impl Area {
-    /// Returns the square around a position that reaches `reach_m` along the axes, metres.
-    pub fn about(at: [f64; 2], reach_m: f64) -> Self {
-        Self { min: at.map(|n| n - reach_m), max: at.map(|n| n + reach_m) }
     }
 }
 

@@ -8,14 +8,14 @@ use std::{
 use flate2::read::MultiGzDecoder;
 use zip::ZipArchive;
 
-use super::{
-    Format, Head,
-    folder::{LeftOut, is_companion},
-    input::{self, HEAD_BYTES, Input, SIBLING_BYTES},
-    load::{self, Options},
-    mosaic::Parts,
-};
-use crate::height::Error;
+use super::companions::{LeftOut, is_companion};
+use super::format::{Format, Formats};
+use super::head::{HEAD_BYTES, Head};
+use super::input::{self, Input, SIBLING_BYTES};
+use super::mosaic::Parts;
+use super::options::Options;
+use super::raster_file;
+use crate::height::error::Error;
 
 /// Most bytes of an unpacked member; larger files must be unpacked first.
 const UNPACKED_BYTES: u64 = 1 << 31;
@@ -28,7 +28,12 @@ pub(super) fn is_tar(head: &[u8]) -> bool {
 }
 
 /// Reads the file inside a gzip file, or the height files of a tar file inside it.
-pub(super) fn gather_gzip(input: &mut Input, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+pub(super) fn gather_gzip(
+    input: &mut Input,
+    options: &Options,
+    formats: Formats,
+    parts: &mut Parts,
+) -> Result<(), Error> {
     let (name, limit) = (input.name, limit(options));
     let error = |e| Error::new(name, "gzip data", e);
     let mut unpacked = MultiGzDecoder::new(&mut input.reader);
@@ -37,25 +42,36 @@ pub(super) fn gather_gzip(input: &mut Input, options: &Options, parts: &mut Part
     if is_tar(&bytes) {
         return gather_members(
             name,
-            &mut tar_members(name, &mut Cursor::new(bytes).chain(unpacked), limit)?,
+            &mut tar_members(name, &mut Cursor::new(bytes).chain(unpacked), formats, limit)?,
             options,
+            formats,
             parts,
         );
     }
     unpacked.take(limit + 1 - bytes.len() as u64).read_to_end(&mut bytes).map_err(error)?;
-    gather_member(name, &bytes, limit, input.siblings, options, parts)
+    gather_member(name, &bytes, limit, input.siblings, options, formats, parts)
 }
 
 /// Reads the height files inside a tar file.
-pub(super) fn gather_tar(input: &mut Input, options: &Options, parts: &mut Parts) -> Result<(), Error> {
-    let mut members = tar_members(input.name, &mut input.reader, limit(options))?;
-    gather_members(input.name, &mut members, options, parts)
+pub(super) fn gather_tar(
+    input: &mut Input,
+    options: &Options,
+    formats: Formats,
+    parts: &mut Parts,
+) -> Result<(), Error> {
+    let mut members = tar_members(input.name, &mut input.reader, formats, limit(options))?;
+    gather_members(input.name, &mut members, options, formats, parts)
 }
 
 /// Reads the height files inside a zip file.
-pub(super) fn gather_zip(input: &mut Input, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+pub(super) fn gather_zip(
+    input: &mut Input,
+    options: &Options,
+    formats: Formats,
+    parts: &mut Parts,
+) -> Result<(), Error> {
     let mut members = Zip::open(input.name, &mut input.reader)?;
-    gather_members(input.name, &mut members, options, parts)
+    gather_members(input.name, &mut members, options, formats, parts)
 }
 
 /// A file in an archive.
@@ -119,7 +135,7 @@ struct Tar {
 }
 
 /// Unpacks the files of a tar file that may be needed, together no more than `limit` bytes.
-fn tar_members(name: &str, reader: &mut dyn Read, limit: u64) -> Result<Tar, Error> {
+fn tar_members(name: &str, reader: &mut dyn Read, formats: Formats, limit: u64) -> Result<Tar, Error> {
     let error = |e| Error::new(name, "tar data", e);
     let (mut list, mut bytes, mut left) = (Vec::new(), Vec::new(), limit);
     let mut archive = tar::Archive::new(reader);
@@ -134,7 +150,7 @@ fn tar_members(name: &str, reader: &mut dyn Read, limit: u64) -> Result<Tar, Err
         }
         let (len, mut content) = (entry.size(), Vec::new());
         entry.by_ref().take(HEAD_BYTES).read_to_end(&mut content).map_err(error)?;
-        if is_companion(&member) || Format::of(&Head::new(&content, len, false)).is_none_or(Format::is_read) {
+        if is_companion(&member) || formats.of(&Head::new(&content, len, false)).is_none_or(Format::is_read) {
             let more = if is_companion(&member) { SIBLING_BYTES.min(left) } else { left };
             entry.take(more + 1).read_to_end(&mut content).map_err(error)?;
         }
@@ -158,7 +174,13 @@ impl Members for Tar {
 }
 
 /// Reads the height files of an archive in the order of their names.
-fn gather_members(name: &str, members: &mut dyn Members, options: &Options, parts: &mut Parts) -> Result<(), Error> {
+fn gather_members(
+    name: &str,
+    members: &mut dyn Members,
+    options: &Options,
+    formats: Formats,
+    parts: &mut Parts,
+) -> Result<(), Error> {
     let list: Vec<(String, u64, usize)> = members.list().iter().map(|m| (m.name.clone(), m.len, m.index)).collect();
     let mut texts = Vec::new();
     for (member, _, index) in list.iter().filter(|(member, ..)| is_companion(member)) {
@@ -168,14 +190,14 @@ fn gather_members(name: &str, members: &mut dyn Members, options: &Options, part
     for (member, len, index) in list.iter().filter(|(member, ..)| !is_companion(member)) {
         let sibling = |extension: &str| sibling(&texts, member, extension);
         let head = members.unpack(*index, HEAD_BYTES)?;
-        let format = Format::of(&Head::new(&head, *len, sibling("hdr").is_some()));
+        let format = formats.of(&Head::new(&head, *len, sibling("hdr").is_some()));
         if format.is_none_or(|format| !format.holds_heights() || format.is_archive()) {
             left_out.add(member, format);
             continue;
         }
         let limit = limit(options);
         let bytes = members.unpack(*index, limit + 1)?;
-        gather_member(&format!("{name}/{member}"), &bytes, limit, &sibling, options, parts)?;
+        gather_member(&format!("{name}/{member}"), &bytes, limit, &sibling, options, formats, parts)?;
     }
     if parts.len() == begin {
         let what = format!("expected a height file, found none among {} members{}", list.len(), left_out.list());
@@ -217,6 +239,7 @@ fn gather_member(
     limit: u64,
     siblings: &dyn Fn(&str) -> Option<Vec<u8>>,
     options: &Options,
+    formats: Formats,
     parts: &mut Parts,
 ) -> Result<(), Error> {
     let len = bytes.len() as u64;
@@ -224,7 +247,7 @@ fn gather_member(
         return Err(too_long(name, limit));
     }
     let head = &bytes[..bytes.len().min(HEAD_BYTES as usize)];
-    let format = Format::of(&Head::new(head, len, siblings("hdr").is_some()));
+    let format = formats.of(&Head::new(head, len, siblings("hdr").is_some()));
     let mut input = Input { name, reader: &mut Cursor::new(bytes), len, siblings };
-    parts.add(name, options, |options| load::read(&mut input, format, options))
+    parts.add(name, options, |options| raster_file::read(&mut input, format, options))
 }

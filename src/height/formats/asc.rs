@@ -1,15 +1,14 @@
 //! ESRI ASCII grid: a header of keys and numbers, then heights as text, rows from the north.
 
-use super::{
-    decoded::Decoded,
-    input::Input,
-    load::Options,
-    text::{self, Words},
-};
-use crate::height::{
-    Error, Samples,
-    georef::{Grid, affine::Affine},
-};
+use super::decoded::Decoded;
+use super::input::Input;
+use super::options::Options;
+use super::text;
+use super::words::Words;
+use crate::height::error::Error;
+use crate::height::georef::affine::Affine;
+use crate::height::georef::place::Grid;
+use crate::height::samples::Samples;
 
 /// The keys of a header, lower case.
 const KEYS: [&str; 11] = [

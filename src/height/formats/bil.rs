@@ -1,26 +1,18 @@
 //! Bare samples with a header beside them: ESRI `.bil` and `.flt`, and ENVI.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use super::{
-    asc,
-    decoded::Decoded,
-    envi,
-    input::Input,
-    load::Options,
-    nodata,
-    raw::Rows,
-    sample::{Order, SampleType},
-    sidecar::Georeference,
-    text,
-};
-use crate::height::{
-    Error,
-    georef::{Grid, affine::Affine},
-};
+use super::bare_header::{Header, Values};
+use super::decoded::Decoded;
+use super::georeference::Georeference;
+use super::input::Input;
+use super::options::Options;
+use super::raw::Rows;
+use super::sample::{Order, SampleType};
+use super::{asc, envi, nodata};
+use crate::height::error::Error;
+use crate::height::georef::affine::Affine;
+use crate::height::georef::place::Grid;
 
 /// The part of the format that is read, for documents.
 pub(super) const ABOUT: &str = "also ESRI FLT and ENVI: bare samples with a `.hdr` beside them";
@@ -45,23 +37,6 @@ pub(super) fn data_beside(header: &Path) -> Option<PathBuf> {
     extensions.map(|e| header.with_extension(e)).find(|path| path.is_file())
 }
 
-/// The content of a header.
-pub(super) struct Header {
-    /// Name of the format, if other than that of the row.
-    pub variant: Option<&'static str>,
-    pub size: [u64; 2],
-    pub sample: SampleType,
-    pub order: Order,
-    /// Bytes before the first row.
-    pub start: u64,
-    /// Bytes from one row to the next, if not those of its samples.
-    pub stride: Option<u64>,
-    /// The text that declares the value for "no data".
-    pub nodata: Option<String>,
-    /// Position, system and scale.
-    pub georeference: Georeference,
-}
-
 /// Reads the samples by the header beside them.
 pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Error> {
     let text = input.sibling_text("hdr").ok_or_else(|| input.error("header", "expected a .hdr beside, found none"))?;
@@ -84,33 +59,6 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     raster.variant = header.variant;
     raster.georeference = header.georeference;
     Ok(raster)
-}
-
-/// The values of a header, with errors that name the key.
-pub(super) struct Values<'a> {
-    /// The data file.
-    pub name: &'a str,
-    pub values: BTreeMap<String, String>,
-}
-
-impl Values<'_> {
-    pub fn text(&self, key: &str) -> Option<&str> {
-        self.values.get(key).map(String::as_str)
-    }
-
-    pub fn error(&self, key: &str, what: impl ToString) -> Error {
-        Error::new(self.name, format!("header {key}"), what)
-    }
-
-    pub fn number<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>, Error> {
-        let wrong = |text| self.error(key, format!("expected a number in range, found {text:?}"));
-        let parse = |text: &str| text.parse().ok().or_else(|| text::number(text)?.to_string().parse().ok());
-        self.text(key).map(|text| parse(text).ok_or_else(|| wrong(text))).transpose()
-    }
-
-    pub fn required<T: std::str::FromStr>(&self, key: &str) -> Result<T, Error> {
-        self.number(key)?.ok_or_else(|| self.error(key, "expected a number, found none"))
-    }
 }
 
 fn parse(name: &str, text: &str) -> Result<Header, Error> {

@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::{
-    bil::{Header, Values},
-    sample::{Order, SampleType},
-    sidecar::Georeference,
-};
-use crate::height::{
-    Error,
-    georef::{Ellipsoid, Unit, affine::Affine, crs, crs::Crs, units},
-};
+use super::bare_header::{Header, Values};
+use super::georeference::Georeference;
+use super::sample::{Order, SampleType};
+use crate::height::error::Error;
+use crate::height::georef::affine::Affine;
+use crate::height::georef::crs::Crs;
+use crate::height::georef::ellipsoid::Ellipsoid;
+use crate::height::georef::mercator::is_web_mercator;
+use crate::height::georef::unit::Unit;
+use crate::height::georef::{crs_text, units};
 
 /// Returns true if a file begins as such a header.
 pub(super) fn is_header(head: &[u8]) -> bool {
@@ -76,7 +77,7 @@ fn georeference(values: &Values) -> Result<Georeference, Error> {
     if let Some(fields) = &fields {
         georeference.affine = Some(affine(values, fields)?);
     }
-    let stated = values.text("coordinate system string").and_then(crs::from_text);
+    let stated = values.text("coordinate system string").and_then(crs_text::from_text);
     georeference.crs = stated.or_else(|| fields.map(|fields| system(&fields)));
     georeference.band.scale = first(values, "data gain values")?;
     georeference.band.offset = first(values, "data offset values")?;
@@ -125,7 +126,7 @@ fn system(fields: &[&str]) -> Crs {
             let radians = units::named_angle(unit).unwrap_or(1f64.to_radians());
             Unit::Angles { radians, ellipsoid: Ellipsoid::WGS84 }
         }
-        _ if crs::is_web_mercator(projection) => Unit::Mercator,
+        _ if is_web_mercator(projection) => Unit::Mercator,
         _ => Unit::Metres(units::named_length(unit).unwrap_or(1.0)),
     };
     Crs { unit: Some(unit), name: name(fields), ..Crs::default() }

@@ -2,17 +2,15 @@
 //!
 //! The file has no header: the length gives the size, the name the position of the south-west corner.
 
-use super::{
-    decoded::Decoded,
-    input::Input,
-    load::Options,
-    raw::Rows,
-    sample::{Order, SampleType},
-};
-use crate::height::{
-    Error,
-    georef::{Place, Unit, metres_per_degree},
-};
+use super::decoded::Decoded;
+use super::input::Input;
+use super::options::Options;
+use super::raw::Rows;
+use super::sample::{Order, SampleType};
+use crate::height::error::Error;
+use crate::height::georef::ellipsoid::metres_per_degree;
+use crate::height::georef::place::Place;
+use crate::height::georef::unit::Unit;
 
 /// The value of a void.
 const VOID: f64 = -32768.0;

@@ -6,8 +6,9 @@ use std::{
     path::Path,
 };
 
-use super::{Format, Head, load::Options, text};
-use crate::height::Error;
+use super::options::Options;
+use super::text;
+use crate::height::error::Error;
 
 /// Opens a file and passes it to `read`.
 pub(super) fn with_input<T>(path: &Path, read: impl FnOnce(&mut Input) -> Result<T, Error>) -> Result<T, Error> {
@@ -27,6 +28,16 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     let file = File::open(path).map_err(error)?;
     let len = file.metadata().map_err(error)?.len();
     Ok((file, len))
+}
+
+/// Most bytes of a small file, as a tile or a description.
+const SMALL_BYTES: u64 = 1 << 26;
+
+/// Reads a small file.
+pub(super) fn small_file(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    open(path)?.0.take(SMALL_BYTES).read_to_end(&mut bytes).map_err(|e| Error::new(name, "file", e))?;
+    Ok(bytes)
 }
 
 /// The most bytes read from a file beside the data: headers and projections are short texts.
@@ -89,14 +100,6 @@ impl Input<'_> {
         }
         Ok(())
     }
-    /// Detects the format from the file's content; `None` if it is no known one.
-    pub fn format(&mut self, options: &Options) -> Result<Option<&'static Format>, Error> {
-        let mut bytes = Vec::new();
-        let read = self.reader.take(HEAD_BYTES).read_to_end(&mut bytes);
-        read.and_then(|_| self.reader.rewind()).map_err(|e| self.error("byte 0", e))?;
-        let head = Head::new(&bytes, self.len, (self.siblings)("hdr").is_some());
-        Ok(Format::of(&Head { is_raw: options.raw.is_some(), ..head }))
-    }
 }
 
 /// Returns the number of samples of a size, if the options allow it.
@@ -122,6 +125,3 @@ pub(super) fn one_band(name: &str, options: &Options) -> Result<(), Error> {
         }
     }
 }
-
-/// Bytes read from the beginning of a file to detect its format.
-pub(super) const HEAD_BYTES: u64 = 4096;

@@ -2,114 +2,17 @@
 
 use std::{io::Cursor, path::Path};
 
-use serde::Serialize;
+use super::format::{Formats, Read};
+use super::gather::{gather, gather_file};
+use super::input::Input;
+use super::loaded::Loaded;
+use super::mosaic::Parts;
+use super::options::Options;
+use super::table::FORMATS;
+use crate::height::error::Error;
 
-use super::{
-    Encoding, FORMATS, Format, RawLayout, Read, Reader,
-    decoded::Decoded,
-    input::{Input, one_band, with_input},
-    located::Footprint,
-    mosaic::Parts,
-    raw, sidecar,
-};
-use crate::height::{Error, Field};
-
-/// Treatment of samples without data.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum HoleFill {
-    /// They stay holes.
-    #[default]
-    No,
-    /// They get the heights interpolated from around them and count as data.
-    Interpolate,
-}
-
-/// Options for reading a file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// Distance of neighbouring samples (x, z), metres, instead of what the file says.
-    pub spacing: Option<[f64; 2]>,
-    /// Multiplies every height.
-    pub height_scale: Option<f64>,
-    /// Added to every height after that, metres.
-    pub height_offset: f64,
-    /// The value that means "no data", instead of what the file says.
-    pub nodata: Option<f64>,
-    /// The file is bare samples of this layout.
-    pub raw: Option<RawLayout>,
-    /// The part to keep: x, z, width, height in samples.
-    pub crop: Option<[u32; 4]>,
-    /// Repetitions of the field along (x, z).
-    pub tiles: Option<[u32; 2]>,
-    /// Treatment of samples without data.
-    pub hole_fill: HoleFill,
-    /// Encoding of heights in the colours of a picture.
-    pub encoding: Option<Encoding>,
-    /// The band of a file of several, from 1; by default the first, or the colours of a picture.
-    pub band: Option<u32>,
-    /// Zoom level of a tile directory; by default the highest complete one.
-    pub zoom: Option<u32>,
-    /// Files that claim more samples are refused.
-    pub max_samples: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            spacing: None,
-            height_scale: None,
-            height_offset: 0.0,
-            nodata: None,
-            raw: None,
-            crop: None,
-            tiles: None,
-            hole_fill: HoleFill::No,
-            encoding: None,
-            band: None,
-            zoom: None,
-            max_samples: 1 << 30,
-        }
-    }
-}
-
-/// A field read from a file, and information about the file.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The heights.
-    pub field: Field,
-    /// Name of the file format.
-    pub format: &'static str,
-    /// Name of the type of a stored sample, as in `i16`.
-    pub sample_type: String,
-    /// True if 16 bits a sample hold every height without loss.
-    pub exact_in_16_bit: bool,
-    /// Part of the file that was read, and its position.
-    pub footprint: Footprint,
-    /// Warnings for the user, one sentence each.
-    pub warnings: Vec<String>,
-    /// The files that the heights come from, in the order in which a later one overlies an earlier one.
-    pub sources: Vec<SourceFile>,
-}
-
-/// A file that heights come from, and its position in the field before the crop.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct SourceFile {
-    /// The file's name; of a member of an archive after the archive's name.
-    pub file: String,
-    /// Name of the file format.
-    pub format: &'static str,
-    /// Column and row of its north-west sample.
-    pub at: [u32; 2],
-    /// Samples along (x, z).
-    pub size: [u32; 2],
-}
-
-impl SourceFile {
-    /// The file of a raster whose north-west sample lies at a column and row.
-    pub(super) fn of(file: &str, raster: &Decoded, at: [u32; 2]) -> Self {
-        Self { file: file.to_owned(), format: raster.format, at, size: raster.size }
-    }
-}
+/// The formats that are read.
+const KNOWN: Formats = Formats(FORMATS);
 
 /// Reads a file, a directory of tiles, or a folder of height files.
 pub fn load(path: &Path, options: &Options) -> Result<Loaded, Error> {
@@ -123,7 +26,7 @@ pub fn load_all(paths: &[&Path], options: &Options) -> Result<Loaded, Error> {
     for path in paths {
         match path.is_dir() {
             true => gather_folder(path, options, &mut parts)?,
-            false => gather_file(path, options, &mut parts)?,
+            false => gather_file(path, options, KNOWN, &mut parts)?,
         }
     }
     let first = paths.first().map_or_else(String::new, |path| path.display().to_string());
@@ -146,9 +49,9 @@ pub fn load_bytes_with(
 ) -> Result<Loaded, Error> {
     let len = bytes.len() as u64;
     let mut input = Input { name, reader: &mut Cursor::new(bytes), len, siblings };
-    let format = input.format(options)?;
+    let format = KNOWN.of_input(&mut input, options)?;
     let mut parts = Parts::default();
-    gather(&mut input, format, options, &mut parts)?;
+    gather(&mut input, format, options, KNOWN, &mut parts)?;
     finish(parts, name, options)
 }
 
@@ -164,7 +67,7 @@ fn finish(parts: Parts, name: &str, options: &Options) -> Result<Loaded, Error> 
 fn gather_folder(path: &Path, options: &Options, parts: &mut Parts) -> Result<(), Error> {
     for format in FORMATS.iter().filter(|format| format.may_be(path)) {
         match format.read {
-            Some(Read::Dataset(gather)) if gather(path, options, parts)? => break,
+            Some(Read::Dataset(gather)) if gather(path, options, KNOWN, parts)? => break,
             Some(_) => (),
             None => return Err(Error::new(path.display().to_string(), "content", format.refusal())),
         }
@@ -172,80 +75,13 @@ fn gather_folder(path: &Path, options: &Options, parts: &mut Parts) -> Result<()
     Ok(())
 }
 
-/// Reads the rasters of a file.
-pub(super) fn gather_file(path: &Path, options: &Options, parts: &mut Parts) -> Result<(), Error> {
-    with_input(path, |input| {
-        let format = input.format(options)?;
-        let Some(Format { name, read: Some(Read::Beside { data, read }), .. }) = format else {
-            return gather(input, format, options, parts);
-        };
-        let data = data(path).ok_or_else(|| no_data(input))?;
-        with_input(&data, |input| {
-            parts.add(input.name, options, |options| {
-                one_band(input.name, options)?;
-                decode(input, name, *read, options)
-            })
-        })
-    })
-}
-
-/// Detects the format of a file; `None` if it is no known one.
-pub(super) fn format_of(path: &Path, options: &Options) -> Result<Option<&'static Format>, Error> {
-    with_input(path, |input| input.format(options))
-}
-
-/// Reads the rasters of a file: one, or those of an archive.
-fn gather(
-    input: &mut Input,
-    format: Option<&'static Format>,
-    options: &Options,
-    parts: &mut Parts,
-) -> Result<(), Error> {
-    match format.and_then(|format| format.read.as_ref()) {
-        Some(Read::Archive(gather)) => gather(input, options, parts),
-        _ => parts.add(input.name, options, |options| read(input, format, options)),
-    }
-}
-
-/// Reads a file of one raster, and the files beside it.
-pub(super) fn read(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
-    let Some(Format { name, read: Some(Read::Bands(read)), .. }) = format else {
-        one_band(input.name, options)?;
-        return read_only_band(input, format, options);
-    };
-    decode(input, name, *read, options)
-}
-
-fn read_only_band(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
-    let Some(format) = format else { return Err(input.error("content", raw::hint(input.len))) };
-    match &format.read {
-        Some(Read::One(read) | Read::Bands(read)) => decode(input, format.name, *read, options),
-        Some(Read::Beside { .. }) => Err(no_data(input)),
-        Some(Read::Archive(_)) => {
-            Err(input.error("content", "expected a height file, found an archive within an archive"))
-        }
-        Some(Read::Dataset(_)) | None => Err(input.error("content", format.refusal())),
-    }
-}
-
-fn no_data(input: &Input) -> Error {
-    input.error("data", "expected a data file beside the header, found none")
-}
-
-/// Reads a raster of the format called `name`, and the files beside it.
-fn decode(input: &mut Input, name: &'static str, read: Reader, options: &Options) -> Result<Decoded, Error> {
-    let mut decoded = read(input, options)?;
-    decoded.format = decoded.variant.unwrap_or(name);
-    sidecar::settle(input, options, &mut decoded);
-    Ok(decoded)
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::{self, BufReader, Seek};
 
     use super::*;
-    use crate::height::{Holes, Samples, save};
+    use crate::height::formats::raster_file::read;
+    use crate::height::{Field, Holes, Samples, save};
 
     /// A file whose content changes at the first seek.
     struct Changing {
@@ -269,12 +105,17 @@ mod tests {
     }
 
     /// Reads a file that becomes `then` once its format is detected.
-    fn changed(name: &str, first: &[u8], then: Vec<u8>, raw: Option<RawLayout>) -> Result<Loaded, Error> {
+    fn changed(
+        name: &str,
+        first: &[u8],
+        then: Vec<u8>,
+        raw: Option<crate::height::RawLayout>,
+    ) -> Result<Loaded, Error> {
         let len = first.len() as u64;
         let mut reader = BufReader::with_capacity(16, Changing { now: Cursor::new(first.to_vec()), then: Some(then) });
         let mut input = Input { name, reader: &mut reader, len, siblings: &|_| None };
         let options = Options { raw, max_samples: 1 << 16, ..Options::default() };
-        let format = input.format(&options)?;
+        let format = KNOWN.of_input(&mut input, &options)?;
         read(&mut input, format, &options)?.finish(name, &options)
     }
 

@@ -1,28 +1,18 @@
-//! Position of a field and of a picture in their coordinate system, to lay one over the other.
+//! Position of a picture in its coordinate system, to lay it over a field.
 
 use std::path::Path;
 
 use tiff::decoder::Decoder;
 
-use super::{
-    decoded::Decoded,
-    input::{self, Input},
-    load::Options,
-    sidecar::{self, Georeference},
-    tiff::geokeys,
-};
-use crate::height::{Error, Samples, georef::Place};
-
-/// The part of a file that a field was read from, and its position.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Footprint {
-    /// Samples of the whole file (x, z).
-    pub whole: [u32; 2],
-    /// The field's first sample in it.
-    pub first: [u32; 2],
-    /// Place of that sample, if the file states one.
-    pub place: Option<Place>,
-}
+use super::decoded::Decoded;
+use super::georeference::Georeference;
+use super::input::{self, Input};
+use super::options::Options;
+use super::sidecar;
+use super::tiff::geokeys;
+use crate::height::error::Error;
+use crate::height::georef::place::Place;
+use crate::height::samples::Samples;
 
 /// Position of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,7 +2,9 @@
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use crate::height::georef::{affine::Affine, crs, crs::Crs};
+use crate::height::georef::affine::Affine;
+use crate::height::georef::crs::Crs;
+use crate::height::georef::crs_text;
 
 /// Most elements and texts that are read.
 const MAX_NODES: u32 = 1 << 18;
@@ -95,7 +97,7 @@ pub(super) fn from_aux_xml(text: &str, band: u32) -> Metadata {
         // ArcGIS writes the system deeper down, by the name of WKT.
         let esri = || root.descendants().find(|node| node.has_tag_name("WKT")).and_then(|node| node.text());
         if let Some(system) = text(root, "SRS").or_else(|| esri().map(str::to_owned)).filter(|t| !t.trim().is_empty()) {
-            metadata.crs = crs::from_text(&system);
+            metadata.crs = crs_text::from_text(&system);
             if metadata.crs.is_none() {
                 let head: String = system.chars().take(40).collect();
                 metadata.warnings.push(format!(".aux.xml SRS: expected a known system, found {head:?}; ignored"));

@@ -1,14 +1,14 @@
 //! Mosaics: one raster from several on one grid, which are files named together, a folder, or members of an archive.
 
-use super::{
-    decoded::Decoded,
-    input,
-    load::{Options, SourceFile},
-};
-use crate::height::{
-    Error, Holes, Samples,
-    georef::{Place, Unit},
-};
+use super::decoded::Decoded;
+use super::input;
+use super::loaded::SourceFile;
+use super::options::Options;
+use crate::height::error::Error;
+use crate::height::georef::place::Place;
+use crate::height::georef::unit::Unit;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Distance from the common grid up to which a file counts as on it, samples: coordinates are rounded in files.
 const ON_GRID: f64 = 0.01;
@@ -100,7 +100,7 @@ impl Parts {
     pub fn join(self, name: &str, options: &Options) -> Result<(Decoded, Vec<SourceFile>), Error> {
         let Self { mut list, warnings, .. } = self;
         if let [part] = &mut list[..] {
-            let source = SourceFile::of(&part.name, &part.raster, [0, 0]);
+            let source = source_file(&part.name, &part.raster, [0, 0]);
             part.raster.warnings.extend(warnings);
             return Ok((list.remove(0).raster, vec![source]));
         }
@@ -112,13 +112,18 @@ impl Parts {
         let Layout { size, corners, place, moved } = Layout::of(name, &mut parts)?;
         let count = input::samples(name, size, options)?;
         let size = size.map(|n| n as u32);
-        let sources = parts.iter().zip(&corners).map(|(part, &at)| SourceFile::of(&part.name, &part.raster, at));
+        let sources = parts.iter().zip(&corners).map(|(part, &at)| source_file(&part.name, &part.raster, at));
         let sources = sources.collect();
         let mut raster = Canvas::paint(parts, size, count, &corners);
         raster.place = Some(place);
         raster.warnings.splice(0..0, warnings.into_iter().chain(moved));
         Ok((raster, sources))
     }
+}
+
+/// The file of a raster whose north-west sample lies at a column and row.
+fn source_file(file: &str, raster: &Decoded, at: [u32; 2]) -> SourceFile {
+    SourceFile { file: file.to_owned(), format: raster.format, at, size: raster.size }
 }
 
 /// Returns true if two rasters have the same size at the same place.

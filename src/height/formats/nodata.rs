@@ -1,6 +1,8 @@
 //! The value that means "no data", as programs write it.
 
-use super::{decoded::Decoded, load::Options};
+use super::decoded::Decoded;
+use super::options::Options;
+use crate::height::samples::Samples;
 
 /// Largest absolute value of a height, metres: programs fill samples without data with larger ones.
 pub(super) const BEYOND: f64 = 1e30;
@@ -38,7 +40,7 @@ impl Decoded {
     /// Makes holes of the nodata value, NaN, infinities and values beyond [`BEYOND`].
     pub(super) fn make_holes(&mut self, options: &Options) {
         let nodata = options.nodata.or(self.nodata).map(|value| value / self.step);
-        if nodata.is_none() && matches!(self.samples, crate::height::Samples::Coded { .. }) {
+        if nodata.is_none() && matches!(self.samples, Samples::Coded { .. }) {
             return;
         }
         // The nodata value is often rounded on its way through text: two units in the last place of an f32.

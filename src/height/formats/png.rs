@@ -1,18 +1,16 @@
 //! PNG with 8 or 16 bits of grey: a sample is the grey value. All its checksums are compared.
 
-use std::io::{BufRead, Seek};
+use png::{BitDepth, ColorType, DecodingError, Limits};
 
-use image::RgbaImage;
-use png::{BitDepth, ColorType, DecodeOptions, Decoder, DecodingError, Limits, Transformations};
-
-use super::{
-    decoded::Decoded,
-    input::{self, Input},
-    load::Options,
-    sample::{Order, SampleType},
-    terrain_rgb,
-};
-use crate::height::{Error, Holes, Samples};
+use super::decoded::Decoded;
+use super::input::{self, Input};
+use super::options::Options;
+use super::picture::checked;
+use super::sample::{Order, SampleType};
+use super::terrain_rgb;
+use crate::height::error::Error;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Most bytes that a byte of Deflate data can expand to.
 const EXPANSION: u64 = 1032;
@@ -69,46 +67,6 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     raster.holes = target.holes;
     raster.nodata = transparent.map(f64::from);
     Ok(raster)
-}
-
-/// Returns a decoder that verifies every checksum, of optional chunks too: one of them holds the transparent value.
-fn checked<R: BufRead + Seek>(reader: R) -> Decoder<R> {
-    let mut options = DecodeOptions::default();
-    options.set_ignore_adler32(false);
-    options.set_skip_ancillary_crc_failures(false);
-    Decoder::new_with_options(reader, options)
-}
-
-/// Reads a picture of 8 bits a channel as colours with opacity.
-pub(super) fn colours(name: &str, reader: impl input::ReadSeek, options: &Options) -> Result<RgbaImage, Error> {
-    let error = |e: DecodingError| Error::new(name, "picture", e);
-    let mut decoder = checked(reader);
-    let header = decoder.read_header_info().map_err(error)?;
-    let (w, h, depth) = (header.width, header.height, header.bit_depth);
-    // Servers send a picture of one pixel for absent tiles.
-    input::samples(name, [w, h].map(|n| u64::from(n.max(2))), options)?;
-    let count = w as usize * h as usize;
-    if depth == BitDepth::Sixteen {
-        return Err(Error::new(name, "picture", "expected 8 bits a channel, found 16"));
-    }
-    decoder.set_limits(Limits { bytes: Limits::default().bytes.saturating_add(count.saturating_mul(4)) });
-    // A palette becomes colours, and a transparent colour opacity.
-    decoder.set_transformations(Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(error)?;
-    let channels = reader.output_color_type().0.samples();
-    let mut pixels = vec![0; count * channels];
-    reader.next_frame(&mut pixels).map_err(error)?;
-    reader.finish().map_err(error)?;
-    let mut picture = RgbaImage::new(w, h);
-    for (to, pixel) in picture.pixels_mut().zip(pixels.chunks_exact(channels)) {
-        to.0 = match *pixel {
-            [grey] => [grey, grey, grey, u8::MAX],
-            [grey, alpha] => [grey, grey, grey, alpha],
-            [r, g, b] => [r, g, b, u8::MAX],
-            _ => [pixel[0], pixel[1], pixel[2], pixel[3]],
-        };
-    }
-    Ok(picture)
 }
 
 /// Samples and holes that pixels are stored to.

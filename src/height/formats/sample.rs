@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use crate::height::Samples;
+use crate::height::samples::Samples;
 
 /// Order of the bytes of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,25 +2,15 @@
 //!
 //! Priority is GDAL's: `.aux.xml`, then the file itself, then a world file and `.prj`.
 
-use super::{
-    decoded::Decoded,
-    input::Input,
-    load::Options,
-    metadata::{self, Metadata},
-    world_file,
-};
-use crate::height::georef::{Place, Unit, affine::Affine, affine::Turn, crs, crs::Crs, units};
-
-/// Statements of a file about position and units, before those of the files beside it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Georeference {
-    /// Coordinates of samples.
-    pub affine: Option<Affine>,
-    /// The coordinate reference system.
-    pub crs: Option<Crs>,
-    /// Scale, offset, unit and nodata of the band.
-    pub band: Metadata,
-}
+use super::decoded::Decoded;
+use super::input::Input;
+use super::options::Options;
+use super::{metadata, world_file};
+use crate::height::georef::affine::{Affine, Turn};
+use crate::height::georef::crs::Crs;
+use crate::height::georef::place::Place;
+use crate::height::georef::unit::Unit;
+use crate::height::georef::{crs_text, units};
 
 /// Settles the place, the turn, the scale and the unit of a raster.
 pub(super) fn settle(input: &Input, options: &Options, raster: &mut Decoded) {
@@ -65,7 +55,7 @@ fn projection(input: &Input, raster: &mut Decoded) -> Option<Crs> {
         return None;
     }
     let text = input.sibling_text("prj")?;
-    let crs = crs::from_text(&text);
+    let crs = crs_text::from_text(&text);
     if crs.is_none() {
         raster.warnings.push(".prj: expected well-known text or an EPSG code, found neither; ignored".to_owned());
     }

@@ -1,9 +1,9 @@
 //! The table of formats.
 
-use super::Detect::{By, Folder, Magic, Word};
-use super::Read::{Archive, Bands, Beside, Dataset, One};
-use super::{Format, archive, asc, bil, folder, hgt, png, raw, terrain_rgb, tiff, tiles, usgs_dem};
-use super::{read, unread};
+use super::format::Detect::{By, Folder, Magic, Word};
+use super::format::Read::{Archive, Bands, Beside, Dataset, One};
+use super::format::{Format, read, unread};
+use super::{archive, asc, bil, folder, hgt, png, raw, terrain_rgb, tiff, tiles, usgs_dem};
 
 const RASTER: &str = "convert it with `gdal_translate IN OUT.tif`";
 const VARIABLE: &str = "convert one variable with `gdal_translate -sds IN OUT.tif`, or name it: \

@@ -5,11 +5,15 @@ use std::{collections::BTreeMap, path::Path};
 use roxmltree::{Document, Node};
 use serde_json::Value;
 
-use super::{terrain_rgb::Encoding, tiles::bytes};
-use crate::height::{
-    Error,
-    georef::{MERCATOR_HALF, Place, Unit, crs, crs::Crs},
-};
+use super::encoding::Encoding;
+use super::input::small_file;
+use super::text::without_mark;
+use crate::height::error::Error;
+use crate::height::georef::crs::Crs;
+use crate::height::georef::crs_text;
+use crate::height::georef::mercator::MERCATOR_HALF;
+use crate::height::georef::place::Place;
+use crate::height::georef::unit::Unit;
 
 /// Descriptions as TileJSON or of the MBTiles kind.
 const JSON: [&str; 4] = ["tilejson.json", "tiles.json", "tile.json", "metadata.json"];
@@ -42,14 +46,14 @@ impl TileGrid {
     /// Reads the descriptions in a tile directory.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let json = JSON.iter().find_map(|file| {
-            let text = bytes(&path.join(file), "").ok()?;
-            serde_json::from_slice::<Value>(crate::height::formats::text::without_mark(&text)).ok()
+            let text = small_file(&path.join(file), "").ok()?;
+            serde_json::from_slice::<Value>(without_mark(&text)).ok()
         });
         let word = |key: &str| json.as_ref()?.get(key)?.as_str().map(str::to_lowercase);
-        let mut grid = match bytes(&path.join(TMS), "") {
+        let mut grid = match small_file(&path.join(TMS), "") {
             Ok(text) => {
                 let name = path.join(TMS).display().to_string();
-                Self::of_tms(&name, &String::from_utf8_lossy(crate::height::formats::text::without_mark(&text)))?
+                Self::of_tms(&name, &String::from_utf8_lossy(without_mark(&text)))?
             }
             Err(_) => Self::default(),
         };
@@ -123,6 +127,6 @@ fn number(node: Node, attribute: &str) -> Option<f64> {
 
 /// Unit and name of the coordinate system of a raster profile: well-known text or a code; metres where it is neither.
 fn system(srs: &str) -> (Unit, Option<String>) {
-    let Crs { unit, name, .. } = crs::from_text(srs).unwrap_or_default();
+    let Crs { unit, name, .. } = crs_text::from_text(srs).unwrap_or_default();
     (unit.unwrap_or(Unit::Metres(1.0)), name.or_else(|| (!srs.is_empty()).then(|| srs.to_owned())))
 }

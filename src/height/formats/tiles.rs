@@ -3,19 +3,19 @@
 use std::{
     collections::BTreeMap,
     fs,
-    io::Read,
     path::{Path, PathBuf},
 };
 
-use super::{
-    decoded::Decoded,
-    input,
-    load::Options,
-    mosaic::Parts,
-    terrain_rgb::{self, Encoding},
-    tile_grid::TileGrid,
-};
-use crate::height::{Error, Holes, Samples};
+use super::decoded::Decoded;
+use super::encoding::Encoding;
+use super::format::Formats;
+use super::mosaic::Parts;
+use super::options::Options;
+use super::tile_grid::TileGrid;
+use super::{input, picture};
+use crate::height::error::Error;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Files of one zoom level by column from the west and row from the north.
 type ZoomLevel = BTreeMap<[u32; 2], PathBuf>;
@@ -29,11 +29,9 @@ struct Tiles {
 
 /// The deepest zoom level: 2^30 tiles a side, so that sample positions fit.
 const MAX_ZOOM: u32 = 30;
-/// Most bytes of a tile.
-const TILE_BYTES: u64 = 1 << 26;
 
 /// Reads a folder of tiles; returns false if it has none.
-pub(super) fn gather(path: &Path, options: &Options, parts: &mut Parts) -> Result<bool, Error> {
+pub(super) fn gather(path: &Path, options: &Options, _: Formats, parts: &mut Parts) -> Result<bool, Error> {
     let Some(tiles) = scan(path)? else { return Ok(false) };
     parts.add(&path.display().to_string(), options, |options| read(path, tiles, options))?;
     Ok(true)
@@ -53,12 +51,12 @@ fn read(path: &Path, tiles: Tiles, options: &Options) -> Result<Decoded, Error> 
     let mut empty = 0;
     for (&[x, y], file) in &level {
         let tile_name = file.display().to_string();
-        let content = bytes(file, &tile_name)?;
+        let content = input::small_file(file, &tile_name)?;
         if content.is_empty() {
             empty += 1;
             continue;
         }
-        let picture = terrain_rgb::decode_bytes(&tile_name, &content, options)?;
+        let picture = picture::decode_bytes(&tile_name, &content, options)?;
         // Servers answer with a transparent picture of any size for absent tiles.
         if picture.pixels().all(|pixel| pixel.0[3] == 0) {
             continue;
@@ -174,7 +172,7 @@ fn encoding(path: &Path, name: &str, grid: &TileGrid, options: &Options) -> Resu
     let absolute = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let descriptions =
         ["tilejson.json", "tiles.json", "tile.json", "metadata.json", "README.md", "README.txt", "README"];
-    let texts = descriptions.iter().filter_map(|file| bytes(&path.join(file), name).ok());
+    let texts = descriptions.iter().filter_map(|file| input::small_file(&path.join(file), name).ok());
     let texts = texts.map(|bytes| String::from_utf8_lossy(&bytes).to_lowercase());
     let own_name = absolute.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     options
@@ -195,13 +193,6 @@ fn named(text: &str) -> Option<Encoding> {
         (false, true) => Some(Encoding::Mapbox),
         _ => None,
     }
-}
-
-/// Reads a small file.
-pub(super) fn bytes(path: &Path, name: &str) -> Result<Vec<u8>, Error> {
-    let mut bytes = Vec::new();
-    input::open(path)?.0.take(TILE_BYTES).read_to_end(&mut bytes).map_err(|e| Error::new(name, "file", e))?;
-    Ok(bytes)
 }
 
 /// The rectangle that tiles are copied into.

@@ -5,11 +5,17 @@
 
 use std::io::SeekFrom;
 
-use super::{decoded::Decoded, input::Input, load::Options};
-use crate::height::{
-    Error, Holes, Samples,
-    georef::{FOOT, Place, Unit, crs, crs::Crs},
-};
+use super::decoded::Decoded;
+use super::input::Input;
+use super::options::Options;
+use crate::height::error::Error;
+use crate::height::georef::crs::Crs;
+use crate::height::georef::epsg::from_epsg;
+use crate::height::georef::place::Place;
+use crate::height::georef::unit::Unit;
+use crate::height::georef::units::FOOT;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Bytes of a record.
 const RECORD: usize = 1024;
@@ -76,7 +82,7 @@ impl Header {
 
     /// Degrees on the ellipsoid of the datum.
     fn angles(&self) -> Unit {
-        crs::from_epsg(self.codes().0).and_then(|crs| crs.unit).unwrap_or(Unit::DEGREES)
+        from_epsg(self.codes().0).and_then(|crs| crs.unit).unwrap_or(Unit::DEGREES)
     }
 
     fn crs(&self) -> Option<String> {

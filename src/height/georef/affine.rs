@@ -1,6 +1,6 @@
 //! The affine transformation from raster positions to coordinates, and the turn that lays a raster north up.
 
-use super::Grid;
+use super::place::Grid;
 
 /// The largest part of a step that may point across its axis in an unrotated grid.
 const ACROSS: f64 = 1e-6;

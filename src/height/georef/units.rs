@@ -2,7 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::{FOOT, US_FOOT};
+/// International foot, metres.
+pub const FOOT: f64 = 0.3048;
+/// US survey foot, metres.
+pub const US_FOOT: f64 = 1200.0 / 3937.0;
 
 /// Metres of the EPSG units of length; EPSG registry v11.022, by `pyproj` 3.7.2.
 const LENGTHS: [(u16, f64); 55] = [

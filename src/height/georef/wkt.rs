@@ -2,10 +2,11 @@
 
 use proj4wkt::parser::{Attribute, Processor, parse as parse_tree};
 
-use super::{
-    Ellipsoid, Unit,
-    crs::{self, Crs},
-};
+use super::crs::Crs;
+use super::ellipsoid::Ellipsoid;
+use super::mercator::is_web_mercator;
+use super::registry;
+use super::unit::Unit;
 
 /// Brackets within brackets; systems in use stay below 12.
 const MAX_DEPTH: usize = 32;
@@ -17,7 +18,7 @@ const LOCAL: [&str; 4] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "ENGINEERCRS"]
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// Reads a system, or a horizontal and a vertical system one after the other as ESRI writes them.
-pub(in crate::internal::height) fn parse(text: &str) -> Option<Crs> {
+pub fn parse(text: &str) -> Option<Crs> {
     if !text.contains('[') || depth(text) > MAX_DEPTH {
         return None;
     }
@@ -122,7 +123,7 @@ impl Node {
         let method = self.find(&["PROJECTION", "METHOD"]).and_then(|node| node.texts.first());
         let code = self.name();
         let names = [self.texts.first(), method, code.as_ref()];
-        let is_mercator = names.into_iter().flatten().any(|name| crs::is_web_mercator(name));
+        let is_mercator = names.into_iter().flatten().any(|name| is_web_mercator(name));
         let is_earth = self.ellipsoid().is_none_or(|ellipsoid| ellipsoid.is_earth());
         match self.unit() {
             _ if is_mercator && is_earth => Unit::Mercator,
@@ -146,7 +147,7 @@ impl Node {
     }
 
     fn vertical(&self) -> Crs {
-        let by_code = || crs::vertical(self.epsg()?)?.height_unit;
+        let by_code = || registry::vertical(self.epsg()?)?.height_unit;
         let is_down = |label: &String| label == "DOWN";
         let by_axis = self.children.iter().any(|child| child.is(&["AXIS"]) && child.labels.iter().any(is_down));
         // ESRI states the direction as a parameter.

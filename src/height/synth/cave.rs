@@ -6,7 +6,9 @@
 use rayon::prelude::*;
 
 use super::noise;
-use crate::height::{Field, Holes, Samples};
+use crate::height::field::Field;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Distance of samples, metres.
 const SPACING: f64 = 1.0;

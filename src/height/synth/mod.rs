@@ -6,15 +6,15 @@ mod eroded;
 pub mod flow;
 mod fractal;
 pub mod noise;
-pub mod overlay;
 mod peers;
 mod plain;
+mod rock;
 mod settle;
 
 use std::fmt;
 use std::str::FromStr;
 
-use super::Field;
+use super::field::Field;
 
 /// A family of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

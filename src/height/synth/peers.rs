@@ -4,7 +4,9 @@
 use rayon::prelude::*;
 
 use super::noise;
-use crate::height::{Field, Holes, Samples};
+use crate::height::field::Field;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Wavelength of the first octave, samples.
 const WAVELENGTH: f64 = 1024.0;

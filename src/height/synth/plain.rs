@@ -1,7 +1,9 @@
 //! Fields with known heights: planes, and extreme ones that break careless renderers.
 
 use super::noise;
-use crate::height::{Field, Holes, Samples};
+use crate::height::field::Field;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// Distance of samples, metres.
 const SPACING: f64 = 10.0;

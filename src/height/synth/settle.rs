@@ -3,9 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::eroded::Rock;
 use super::flow::{Flow, Grid};
 use super::noise;
+use super::rock::Rock;
 
 /// Half width of a trough over √(area drained).
 const WIDTH: f64 = 0.055;

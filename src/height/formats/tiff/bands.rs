@@ -3,12 +3,13 @@
 use std::io::{Read, Seek, SeekFrom};
 
 use super::layout::{Chunk, Layout};
-use crate::height::formats::{
-    load::Options,
-    sample::{Order, SampleType},
-    terrain_rgb::{self, Encoding},
-};
-use crate::height::{Error, Holes, Samples};
+use crate::height::error::Error;
+use crate::height::formats::encoding::Encoding;
+use crate::height::formats::options::Options;
+use crate::height::formats::sample::{Order, SampleType};
+use crate::height::formats::terrain_rgb;
+use crate::height::holes::Holes;
+use crate::height::samples::Samples;
 
 /// The bands that are read.
 pub(super) struct Bands {

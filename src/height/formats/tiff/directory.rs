@@ -7,8 +7,10 @@ use std::{
     io::{self, Read, Seek, SeekFrom},
 };
 
-use crate::height::Error;
-use crate::height::formats::{input::Input, load::Options, sample::Order};
+use crate::height::error::Error;
+use crate::height::formats::input::Input;
+use crate::height::formats::options::Options;
+use crate::height::formats::sample::Order;
 
 const WIDTH: u16 = 256;
 const LENGTH: u16 = 257;

@@ -4,7 +4,13 @@ use std::io::{Read, Seek};
 
 use tiff::{decoder::Decoder, tags::Tag};
 
-use crate::height::georef::{Ellipsoid, Unit, affine::Affine, crs, crs::Crs, units, wkt};
+use crate::height::georef::affine::Affine;
+use crate::height::georef::crs::Crs;
+use crate::height::georef::ellipsoid::Ellipsoid;
+use crate::height::georef::epsg::from_epsg;
+use crate::height::georef::mercator::is_web_mercator;
+use crate::height::georef::unit::Unit;
+use crate::height::georef::{registry, units, wkt};
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -24,10 +30,7 @@ const VERTICAL_UNITS: u16 = 4099;
 const USER_DEFINED: u16 = 32767;
 
 /// Reads position and system; absent and broken tags are ignored.
-pub(in crate::internal::height::formats) fn read<R: Read + Seek>(
-    decoder: &mut Decoder<R>,
-    warnings: &mut Vec<String>,
-) -> (Option<Affine>, Option<Crs>) {
+pub fn read<R: Read + Seek>(decoder: &mut Decoder<R>, warnings: &mut Vec<String>) -> (Option<Affine>, Option<Crs>) {
     let keys = Keys::read(decoder);
     let centre = if keys.code(RASTER_TYPE) == Some(2) { 0.0 } else { 0.5 };
     let affine = affine(decoder, warnings).map(|affine| affine.shifted([centre; 2]));
@@ -115,7 +118,7 @@ impl Keys {
 
     /// The vertical system by its code, else by the unit that a key declares.
     fn vertical(&self, warnings: &mut Vec<String>) -> Crs {
-        let by_code = self.registered(VERTICAL_TYPE).and_then(|code| crs::vertical(code.into()));
+        let by_code = self.registered(VERTICAL_TYPE).and_then(|code| registry::vertical(code.into()));
         let by_code = by_code.unwrap_or_default();
         let declared = self.code(VERTICAL_UNITS).and_then(units::length);
         if let (Some(registered), Some(declared)) = (by_code.height_unit, declared)
@@ -132,7 +135,7 @@ impl Keys {
     fn named(&self, key: u16, default: &str, warnings: &mut Vec<String>) -> Crs {
         let code = self.registered(key);
         let known = match code {
-            Some(code) => crs::from_epsg(code.into()).filter(|crs| crs.unit.is_some()),
+            Some(code) => from_epsg(code.into()).filter(|crs| crs.unit.is_some()),
             None => self.cited(),
         };
         if let (Some(code), None) = (code, &known) {
@@ -162,7 +165,7 @@ impl Keys {
         let is_named = self.registered(PROJECTED_TYPE).is_some();
         let is_earth = self.ellipsoid().is_none_or(Ellipsoid::is_earth);
         let is_mercator = named.unit == Some(Unit::Mercator);
-        if is_mercator || !is_named && is_earth && crs::is_web_mercator(&self.text) {
+        if is_mercator || !is_named && is_earth && is_web_mercator(&self.text) {
             return Crs { unit: Some(Unit::Mercator), ..named };
         }
         let known = match named.unit {

@@ -9,9 +9,12 @@ use tiff::{
     tags::{ByteOrder, SampleFormat, Tag},
 };
 
-use super::{codec::Codec, sample::Packing};
-use crate::height::Error;
-use crate::height::formats::{load::Options, sample::Order};
+use super::codec::Codec;
+use super::sample::Packing;
+use crate::height::error::Error;
+use crate::height::formats::input;
+use crate::height::formats::options::Options;
+use crate::height::formats::sample::Order;
 
 /// The largest tile or strip, bytes, of files that claim few samples.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -69,7 +72,7 @@ impl Layout {
     /// Reads the layout that a directory describes.
     pub fn read(tags: &mut Tags, order: Order, len: u64, options: &Options) -> Result<Self, Error> {
         let size = [tags.number(Tag::ImageWidth, 0)?, tags.number(Tag::ImageLength, 0)?];
-        crate::height::formats::input::samples(tags.name, size, options)?;
+        input::samples(tags.name, size, options)?;
         let bands = tags.number(Tag::SamplesPerPixel, 1)? as usize;
         let is_planar = tags.number(Tag::PlanarConfiguration, 1)? == 2;
         let photometric = tags.number(Tag::PhotometricInterpretation, 1)?;

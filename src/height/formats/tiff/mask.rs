@@ -4,12 +4,11 @@ use std::io::{Read, Seek};
 
 use tiff::{decoder::Decoder, tags::Tag};
 
-use super::{
-    bands::read_mask,
-    layout::{Layout, Tags, order},
-};
-use crate::height::formats::load::Options;
-use crate::height::{Error, Holes};
+use super::bands::read_mask;
+use super::layout::{Layout, Tags, order};
+use crate::height::error::Error;
+use crate::height::formats::options::Options;
+use crate::height::holes::Holes;
 
 /// Bits of `NewSubfileType`.
 const IS_REDUCED: u64 = 1;

@@ -10,11 +10,15 @@ mod sample;
 
 use ::tiff::{decoder::Decoder, tags::Tag};
 
-use self::{bands::Bands, layout::Layout};
-use crate::height::Error;
-use crate::height::formats::{
-    decoded::Decoded, input::Input, load::Options, metadata, sidecar::Georeference, terrain_rgb::Encoding,
-};
+use self::bands::Bands;
+use self::layout::Layout;
+use super::decoded::Decoded;
+use super::encoding::Encoding;
+use super::georeference::Georeference;
+use super::input::{self, Input};
+use super::metadata;
+use super::options::Options;
+use crate::height::error::Error;
 
 /// Returns true if a file begins as a TIFF or BigTIFF of either byte order.
 pub(super) fn is_tiff(head: &[u8]) -> bool {
@@ -28,7 +32,7 @@ pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Erro
     let mut decoder = Decoder::new(&mut input.reader).map_err(|e| Error::new(name, "directory", e))?;
     let layout = Layout::first(&mut decoder, name, len, options)?;
     let ([w, h], bands) = (layout.size, Bands::choose(&layout, name, options)?);
-    let count = crate::height::formats::input::samples(name, [w, h].map(u64::from), options)?;
+    let count = input::samples(name, [w, h].map(u64::from), options)?;
     let (samples, mut holes) = bands.read(decoder.inner(), &layout, name, count)?;
     mask::apply(&mut decoder, name, len, &mut holes, options)?;
 

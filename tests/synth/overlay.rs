@@ -1,11 +1,10 @@
 //! Colours for heights: water, meadow, forest, scree, rock and snow, by height, slope, hollows and drainage. No light is
 //! baked in.
 
+use cuesta::internal::height::Field;
+use cuesta::internal::height::synth::flow::{Flow, Grid};
+use cuesta::internal::height::synth::noise;
 use image::{Rgb, RgbImage};
-
-use super::flow::{Flow, Grid};
-use super::noise;
-use crate::height::Field;
 
 type Colour = [f64; 3];
 

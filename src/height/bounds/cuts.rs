@@ -1,12 +1,12 @@
 //! Errors of the cells that the end of a tiled field cuts. Such cells equal none of the repeating ones.
 
-use super::Field;
-use super::bounds::{Measure, ROUNDING, is_aligned};
-use super::levels::Patch;
+use super::measure::{Measure, ROUNDING, is_aligned};
+use crate::height::field::Field;
+use crate::height::levels::Patch;
 
 /// Returns the largest error, metres, of the cut cells of each level, from level 0 on.
 ///
-/// Errors are those of [`Bounds`](super::bounds::Bounds). They are infinite where cells may lie anywhere in the period,
+/// Errors are those of [`Bounds`](super::Bounds). They are infinite where cells may lie anywhere in the period,
 /// or are as long as it; their height range then bounds the error. `highest` is the largest absolute height, metres.
 pub fn errors(field: &Field, measure: Measure, levels: u32, highest: f32) -> Vec<f32> {
     let mut errors: Vec<f32> = vec![0.0];

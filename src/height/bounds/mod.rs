@@ -6,17 +6,21 @@
 //! measured once. Otherwise the vertices of a square may lie on any samples, and [`levels::detail`] bounds its error for
 //! all of them, less tightly.
 
+mod cuts;
+mod measure;
+mod square;
+
 use rayon::prelude::*;
 
 use super::disk_cache::DiskCache;
+use super::field::Field;
 use super::levels::{self, Patch};
 use super::progress::Progress;
-use super::{Field, cuts, surface};
+use super::surface;
+use measure::is_aligned;
 
-/// Largest rounding error of a morphed height, relative to the largest height around it.
-///
-/// It is at most 12 half-ulps: six for each of the two steps of `draw::place::lattice_height`.
-pub const ROUNDING: f32 = 8.0 * f32::EPSILON;
+pub use measure::{Measure, ROUNDING};
+pub use square::Square;
 
 /// Stored samples from which on bounds are cached on disk; smaller fields are measured in a moment.
 pub(crate) const KEPT_FROM: u64 = 1 << 23;
@@ -25,33 +29,6 @@ pub(crate) const KEPT_FROM: u64 = 1 << 23;
 ///
 /// Only a whole measurement tells which squares have terrain where the field's end or a square's edge cuts a period.
 const WHOLE_UP_TO: u64 = 1 << 22;
-
-/// Choice of squares and of the quantities measured.
-#[derive(Clone, Copy, Debug)]
-pub struct Measure {
-    /// Cells along a side of a square at every level: a power of two, at least 8.
-    pub cells: u32,
-    /// Smallest ratio of a square's error to those of the squares in it (1: saturated).
-    pub growth: f32,
-    /// True if errors are measured; otherwise they are 0.
-    pub errors: bool,
-    /// True if children morph into their parent: the parent's error then bounds all stages of the morph.
-    pub morph: bool,
-}
-
-/// One square.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Square {
-    /// Largest vertical distance of its surface from the samples, metres, holes excepted.
-    ///
-    /// At least that of the squares in it. In [`Bounds`] it holds with any side one level coarser too, and is at least
-    /// `growth` times that of the squares in it. At level 0 it is 0: only a coarser side is off the samples, and the
-    /// square beyond that side accounts for it.
-    pub error: f32,
-    /// Lowest and highest sample, metres; the lowest is above the highest if there is no terrain.
-    pub range: [f32; 2],
-}
 
 /// All squares of a field.
 pub struct Bounds {
@@ -68,32 +45,6 @@ struct BoundsLevel {
     side: u32,
     count: [u32; 2],
     squares: Vec<Square>,
-}
-
-impl Measure {
-    /// Returns a name for the choice, for file names.
-    fn name(&self) -> String {
-        let Self { cells, growth, errors, morph } = self;
-        let what = if *errors { "errors" } else { "ranges" };
-        format!("{what}-{cells}x{growth}{}", if *morph { "-morph" } else { "" })
-    }
-}
-
-impl Square {
-    /// A square without terrain.
-    pub(crate) const NOTHING: Square = Square { error: 0.0, range: [f32::INFINITY, f32::NEG_INFINITY] };
-
-    /// Returns true if there is any terrain. In [`Bounds`]: if any triangle of the finest surface has data.
-    #[inline]
-    pub fn has_terrain(&self) -> bool {
-        self.range[0] <= self.range[1]
-    }
-
-    /// Returns the bounds of two squares together.
-    pub(crate) fn union(self, other: Square) -> Square {
-        let range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
-        Square { error: self.error.max(other.error), range }
-    }
 }
 
 impl Bounds {
@@ -316,11 +267,6 @@ impl BoundsLevel {
             (at / side, (count - at / side + (end - period) / side + 1).min(count))
         }
     }
-}
-
-/// Returns true if each square of a level equals one in the first period along a tiled axis.
-pub fn is_aligned(period: u32, level: u32, side: u32) -> bool {
-    period.is_multiple_of(side) || side.is_multiple_of(period) && period.is_multiple_of(4 << level)
 }
 
 fn range_of_terrain(field: &Field, first: [u32; 2], reach: [u32; 2]) -> [f32; 2] {
