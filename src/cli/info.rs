@@ -1,4 +1,4 @@
-//! `cuesta info`: describes height files, the scene plan, and the devices.
+//! `cuesta info`: describes a terrain, the scene plan, a view's texture tiles, or the Vulkan devices.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ pub use super::info_args::InfoArgs;
 use super::{plan, report, working_set};
 use crate::height::{Loaded, SourceFile};
 
-/// Description of a field.
+/// Description of a terrain.
 #[derive(Serialize)]
 pub struct Info {
     format: String,
@@ -25,15 +25,15 @@ pub struct Info {
     hole_count: u64,
     sample_type: String,
     exact_in_16_bit: bool,
-    /// Largest difference between the two ways to split a cell, metres.
+    /// Largest difference, at the centre of a cell, between the two ways to split the cell into triangles, metres.
     cell_ambiguity_m: f32,
-    /// The files with the heights; a later one overlies an earlier one.
+    /// The files that the heights come from. Where they overlap, the last one counts.
     sources: Vec<SourceFile>,
     warnings: Vec<String>,
 }
 
 impl Info {
-    /// Describes a field.
+    /// Describes a terrain that was read.
     pub fn of(loaded: &Loaded) -> Self {
         let field = &loaded.field;
         let [width, height] = field.size();
@@ -64,7 +64,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         return devices(common);
     }
     if args.terrain.is_empty() {
-        bail!("info: expected a terrain or --devices");
+        bail!("info: expected a terrain, or --devices");
     }
     let loaded = args.reading.load(common, &args.terrain)?;
     if let Some(path) = &args.working_set {
@@ -83,9 +83,10 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
 
 #[cfg(not(feature = "vulkan"))]
 fn devices(_: &Common) -> Result<Outcome> {
-    bail!("--devices: this build is without Vulkan");
+    bail!("--devices: built without Vulkan");
 }
 
+/// Lists the Vulkan devices and the required features that each lacks.
 #[cfg(feature = "vulkan")]
 fn devices(common: &Common) -> Result<Outcome> {
     use crate::gpu::{Instance, device};
