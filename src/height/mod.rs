@@ -4,6 +4,7 @@ pub mod bezier;
 pub mod bounds;
 pub mod cave;
 mod cuts;
+mod damage;
 pub mod demo;
 pub(crate) mod disk_cache;
 mod field;
@@ -52,7 +53,7 @@ pub struct Error {
 impl Error {
     /// Makes an error at a place of a file.
     pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
-        Self { file: file.into(), place: place.into(), what: one_line(what.to_string()) }
+        Self { file: file.into(), place: place.into(), what: damage::in_plain_words(one_line(what.to_string())) }
     }
 }
 

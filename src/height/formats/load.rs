@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::{
     Encoding, FORMATS, Format, RawLayout, Read, Reader,
     decoded::Decoded,
+    hgt,
     input::{Input, one_band, with_input},
     located::Footprint,
     mosaic::Parts,
@@ -217,7 +218,10 @@ pub(super) fn read(input: &mut Input, format: Option<&'static Format>, options: 
 }
 
 fn read_only_band(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
-    let Some(format) = format else { return Err(input.error("content", raw::hint(input.len))) };
+    let Some(format) = format else {
+        let wrong_length = hgt::wrong_length(input.name, input.len);
+        return Err(input.error("content", wrong_length.unwrap_or_else(|| raw::hint(input.len))));
+    };
     match &format.read {
         Some(Read::One(read) | Read::Bands(read)) => decode(input, format.name, *read, options),
         Some(Read::Beside { .. }) => Err(no_data(input)),
