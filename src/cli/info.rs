@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::common::{Common, Outcome};
 pub use super::info_args::InfoArgs;
 use super::{plan, report, working_set};
-use crate::height::{Loaded, SourceFile};
+use crate::height::{Extent, Loaded, SourceFile};
 
 /// Description of a terrain.
 #[derive(Serialize)]
@@ -19,6 +19,8 @@ pub struct Info {
     spacing_m: [f64; 2],
     origin: [f64; 2],
     crs: Option<String>,
+    /// Rectangle of longitudes and latitudes around the samples, if the coordinate system can be transformed.
+    extent_deg: Option<Extent>,
     min_m: f32,
     max_m: f32,
     mean_m: f64,
@@ -45,6 +47,7 @@ impl Info {
             spacing_m: field.spacing,
             origin: field.origin,
             crs: field.crs.clone(),
+            extent_deg: loaded.footprint.place.as_ref().and_then(|place| place.extent(field.stored())),
             min_m: statistics.min,
             max_m: statistics.max,
             mean_m: statistics.mean,

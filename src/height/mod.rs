@@ -30,7 +30,7 @@ pub use formats::{
     Encoding, FORMATS, Footprint, Format, HoleFill, Loaded, Located, MAX_SIDE, Options, Order, RawLayout, SampleType,
     SourceFile, load, load_all, load_bytes, load_bytes_with, number, place_of,
 };
-pub use georef::{Place, Unit, metres_per_degree};
+pub use georef::{Place, Unit, extent::Extent, metres_per_degree};
 pub use holes::Holes;
 pub use procedural::Procedural;
 pub use raster::{Raster, Statistics};

@@ -1,6 +1,7 @@
 //! The program, run as a person runs it.
 
 mod endless;
+mod info;
 mod numbers;
 #[cfg(feature = "vulkan")]
 mod overlays;

@@ -2,6 +2,7 @@
 
 pub(super) mod affine;
 pub(super) mod crs;
+pub(super) mod extent;
 pub(super) mod units;
 pub(super) mod wkt;
 
