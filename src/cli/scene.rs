@@ -255,9 +255,7 @@ impl ReadArgs {
             load_all(&terrain.iter().map(Path::new).collect::<Vec<_>>(), &options)?
         };
         loaded.field.file = (!self.no_cache && !is_demo).then(|| several::cache_path(terrain).into());
-        for warning in &loaded.warnings {
-            report::warn(common, warning);
-        }
+        warn_of(common, &terrain.join(" "), &loaded);
         Ok(loaded)
     }
 }
@@ -274,6 +272,16 @@ impl TerrainArgs {
     /// Returns the names on the command line, separated by spaces.
     pub fn name(&self) -> String {
         self.terrain.join(" ")
+    }
+}
+
+/// Prints the reader's warnings. Those about a single file get its name, unless they begin with that of the terrain.
+fn warn_of(common: &Common, terrain: &str, loaded: &Loaded) {
+    for warning in &loaded.warnings {
+        match &loaded.sources[..] {
+            [only] if !warning.starts_with(terrain) => report::warn(common, &format!("{}: {warning}", only.file)),
+            _ => report::warn(common, warning),
+        }
     }
 }
 
