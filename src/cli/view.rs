@@ -93,6 +93,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     let Loaded { field, footprint, .. } = args.terrain.load(common)?;
     let field = Arc::new(field);
     let (look, overlay) = args.look.build_for_window(common, &args.terrain.name(), (&field, &footprint))?;
+    let spinner = report::preparing(common, technique.0.name, &technique.1.progress);
     let summary = viewer::run(&Setup {
         name: args.terrain.name(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
@@ -108,6 +109,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         target,
         vsync: args.vsync == Switch::On && args.frame_time.is_none(),
         seconds: args.seconds,
+        on_prepared: Box::new(move || spinner.finish_and_clear()),
         save: report::save,
         on_interrupt: interrupt::once,
     })?;

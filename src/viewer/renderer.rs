@@ -87,6 +87,7 @@ impl WindowRenderer {
         let mut swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
         let (entry, settings) = &setup.technique;
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
+        (setup.on_prepared)();
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         swapchain.set_depth(plan.has_depth())?;
         let (picture, geometry) = (setup.overlay.as_ref(), technique.device_geometry());
