@@ -2,7 +2,7 @@
 //! runs.
 //!
 //! [`run`] calls a [`BenchBackend`] to draw and measure, and writes one row at a time. The backend for a Vulkan device
-//! is in [`device`]; everything else works without one.
+//! is in the module `device`; everything else works without one.
 
 pub mod compare;
 pub mod controller;

@@ -41,7 +41,7 @@ pub struct Pool {
     skirt_pixels: u64,
     pop: Option<Pop>,
     triangles: Option<Triangles>,
-    /// Fragment shader invocations, and fragments that passed the depth test; `None` if a frame lacks the count.
+    /// Fragment shader invocations, and fragments that passed the depth test; `None` if the device does not count them.
     fragments: [Option<u64>; 2],
     /// Pixels covered by terrain, all frames.
     covered: u64,
@@ -71,7 +71,7 @@ impl Pool {
         }
     }
 
-    /// Adds a frame with pending refinements: its largest screen error, pixels, and its depth buffer.
+    /// Adds a frame with pending data: its largest screen error, pixels, and its depth buffer.
     pub fn pending(&mut self, field: &Field, view: &View, max_px: f64, depth: &[f32]) {
         let excess_px = (max_px - view.tolerance.px).max(0.0);
         self.pending.frames += 1;

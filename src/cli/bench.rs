@@ -80,7 +80,7 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
 /// Opens the device that the command line names, as a backend of the benchmark.
 #[cfg(feature = "vulkan")]
 fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
-    let gpu = super::render::open(common, false)?;
+    let gpu = super::render::open(common)?;
     Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look, common.techniques.clone())))
 }
 

@@ -127,7 +127,7 @@ fn plan(
 ) -> Result<(ScenePlan, Option<Measured>)> {
     use crate::scene::{Scene, savings};
 
-    let gpu = super::render::open(common, false)?;
+    let gpu = super::render::open(common)?;
     let (limits, picture) = (gpu.device_limits(), overlay.map(|picture| picture.dimensions().into()));
     let plan = ScenePlan::builder(field, look, &limits).overlay(picture);
     let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;

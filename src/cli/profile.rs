@@ -83,7 +83,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let (look, overlay) = args.look.build(common, &args.terrain.name(), (&field, &footprint))?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
-    let gpu = open(common, false)?;
+    let gpu = open(common)?;
     let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
     let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture).build();
     let plan = plan.map_err(anyhow::Error::msg)?;

@@ -104,12 +104,12 @@ struct Measured {
     counter_example: Option<String>,
 }
 
-/// Opens the Vulkan device that `--device` names, or the best one. `window` requires that it can present to a window.
+/// Opens the Vulkan device that `--device` names, or the best one, for drawing without a window.
 ///
 /// # Errors
 /// If there is no such device, or Vulkan fails.
-pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
-    let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)?;
+pub fn open(common: &Common) -> Result<Arc<Gpu>> {
+    let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), false)?;
     gpu.limit_allocations(common.allocations.unwrap_or(u64::MAX));
     gpu.lose_after(common.lose_device.unwrap_or(u64::MAX));
     Ok(gpu)
@@ -142,7 +142,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepared = Instant::now();
     let mut technique = args.technique.build(common, &field)?;
     let prepare_ms = ms(prepared);
-    let gpu = open(common, false)?;
+    let gpu = open(common)?;
     let picture = overlay.as_ref().map(|picture| picture.dimensions().into());
     let plan = ScenePlan::builder(&field, &look, &gpu.device_limits()).overlay(picture);
     let plan = plan.requirements(technique.pipeline_requirements()).build().map_err(anyhow::Error::msg)?;

@@ -222,7 +222,7 @@ impl Device {
         if args.no_device {
             return Ok(Self(None));
         }
-        match super::render::open(common, false) {
+        match super::render::open(common) {
             Ok(gpu) => {
                 let name = gpu.candidate.name.clone();
                 Ok(Self(Some((name, stress::device::DeviceImageChecker::new(gpu)))))

@@ -337,8 +337,8 @@ fn size(results: &Results, names: &[String]) -> Chart {
 
 /// Chart of the largest error divided by the tolerance against the angle off the view axis, over all cases of a series.
 ///
-/// The guide is 1/cos²θ: at an angle θ off the axis, a displacement covers up to so many times the pixels that eq. 1 of
-/// Judnich and Ling 2012 gives.
+/// The guide is 1/cos²θ: the largest factor by which eq. 1 of Judnich and Ling 2012 underestimates a displacement on the
+/// screen at an angle θ off the axis.
 fn angle(results: &Results, names: &[String]) -> Chart {
     let series = |(style, name): (usize, &String)| {
         let own = results.cases.iter().filter(|result| result.case.series() == *name);

@@ -124,7 +124,7 @@ impl Rule {
         let [often, rate] =
             [1000.0, time.triangles * 1000.0].map(|n| number(n / time.select_ms.max(f64::MIN_POSITIVE)));
         Some(format!(
-            "{series} {px} px: {ms} ms of selection ({often} a second), {triangles} triangles ({rate} a second)"
+            "{series} {px} px: {ms} ms of selection ({often} per second), {triangles} triangles ({rate} per second)"
         ))
     }
 
@@ -141,7 +141,7 @@ impl Rule {
             format!("; their error metric: mean {}, p99 {} px", number(p.mean), number(p.p99))
         });
         Some(format!(
-            "{} {} px: {} ms ({} fps), {} triangles ({} a second), {} draws{error}{figure}",
+            "{} {} px: {} ms ({} fps), {} triangles ({} per second), {} draws{error}{figure}",
             result.case.series(),
             number(result.case.tolerance_px),
             number(frame_ms),
