@@ -1,12 +1,13 @@
-//! Comparison of two benchmarks: times as ratios with intervals, counts and errors exactly.
+//! Comparison of two benchmark runs: times as ratios with confidence intervals, counts and errors exactly.
 //!
-//! Frames are held against each other as [`slowdown`] has it, over their floors: those tell how fast the machine was, and
-//! are compared by themselves, as they tell of shading too.
+//! Frame times are divided by the shading-only times of the same frames before the runs are compared ([`slowdown`]).
+//! This cancels the speed of the machine. Shading-only times are also compared on their own, so that slower shading
+//! is found too.
 //!
-//! All cases of a technique are tested together: that is a regression if the whole interval lies above 1 + threshold.
-//! A single case, or all floors together, are one if it lies above 1 + twice the threshold. Many things are tested at
-//! once, so tails are divided among the techniques and among the cases (Bonferroni). With fewer than [`MIN_ROUNDS`]
-//! rounds in either run no time is judged.
+//! A technique regresses if the interval of all its cases together lies above 1 + threshold. A single case, or the
+//! shading-only times of all cases, regress if the interval lies above 1 + 2 · threshold. The error probability is
+//! divided by the number of techniques, and by the number of cases (Bonferroni correction). Times are not judged if
+//! either run has fewer than [`MIN_ROUNDS`] rounds.
 
 use std::collections::BTreeMap;
 
@@ -17,61 +18,62 @@ use super::rows::Errors;
 use super::slowdown::{Cost, MIN_ROUNDS, Pair, has_shading_only, slowdown};
 use super::statistics::Estimate;
 
-/// Largest relative change that is no regression: a tenth.
+/// Default threshold: relative changes of up to 10 % are not regressions.
 pub const THRESHOLD: f64 = 0.1;
-/// Share of intervals that may miss the truth, all of a kind together.
+/// Error probability on either side of the intervals, shared by all comparisons of one kind.
 const ALARM: f64 = 0.05;
 
-/// Changes between two benchmarks.
+/// Changes from benchmark run A to benchmark run B.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
-    /// Cases that both have.
+    /// Number of cases that both runs contain.
     pub matched: usize,
     /// True if both runs have enough rounds to judge times.
     pub is_judged: bool,
-    /// True if times are divided by the shading-only times; else one of the runs has none, and times are milliseconds.
+    /// True if frame times were divided by shading-only times. False if a run lacks these: frame times are then
+    /// compared directly.
     pub over_shading_only: bool,
-    /// Times of the floors, all cases together.
+    /// Change of the shading-only times, all cases together.
     pub shading_only: Option<Change>,
-    /// Times by technique, all its cases together.
+    /// Change of the frame times of each technique, all its cases together.
     pub techniques: Vec<Change>,
-    /// Times by case.
+    /// Change of the frame times of each case.
     pub cases: Vec<Change>,
-    /// Counts and errors that are not equal.
+    /// Counts and errors that differ between the runs.
     pub differences: Vec<Difference>,
-    /// Cases that only one of the two has.
+    /// Cases that only one of the runs contains.
     pub unmatched: Vec<String>,
-    /// Regressions beyond the threshold, in words.
+    /// One sentence for each regression.
     pub regressions: Vec<String>,
 }
 
-/// The time of one thing in B over that in A.
+/// Change of a time from A to B.
 #[derive(Clone, Debug, Serialize)]
 pub struct Change {
-    /// Name of the timed case.
+    /// The case, the technique with its number of cases, or "shading only".
     pub what: String,
-    /// The ratio, with an interval corrected for the number of comparisons.
+    /// Time in B divided by time in A. The interval is corrected for the number of comparisons.
     pub ratio: Estimate,
-    /// True if the whole interval lies above the threshold.
+    /// True if times are judged and the whole interval lies above the threshold.
     pub is_regression: bool,
 }
 
-/// One exact value in both.
+/// A count or an error that differs between A and B.
 #[derive(Clone, Debug, Serialize)]
 pub struct Difference {
     /// The case.
     pub case: String,
     /// Name of the value.
     pub value: &'static str,
-    /// In A.
+    /// The value in A.
     pub before: f64,
-    /// In B.
+    /// The value in B.
     pub after: f64,
-    /// True if it is worse by more than the threshold, or a guarantee no longer holds.
+    /// True if B is worse by more than the threshold, or by any amount where the value counts broken guarantees.
     pub is_regression: bool,
 }
 
-/// Compares B with A.
+/// Compares run B with run A. `threshold` is the relative change that still counts as noise, 0.1 for 10 %.
 pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     let partner = |case: &CaseResult| b.cases.iter().find(|other| other.case == case.case);
     let pairs: Vec<_> = a.cases.iter().filter_map(|case| partner(case).map(|other| (case, other))).collect();
@@ -82,7 +84,7 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
         let ratio = slowdown(pairs, cost, ALARM / family as f64);
         Change { what, ratio, is_regression: is_judged && ratio.low > 1.0 + allowed }
     };
-    let cost = if over_shading_only { Cost::OverShadingOnly } else { Cost::FrameSample };
+    let cost = if over_shading_only { Cost::OverShadingOnly } else { Cost::Frame };
     let of_case = |pair: &Pair| change(pair.0.case.to_string(), &[*pair], cost, timed.len(), 2.0 * threshold);
     let cases: Vec<_> = timed.iter().map(of_case).collect();
     let families = by_technique(&timed);
@@ -110,6 +112,7 @@ pub fn compare(a: &Results, b: &Results, threshold: f64) -> Comparison {
     }
 }
 
+/// Groups pairs of cases by technique, settings, metric and goal.
 fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
     let mut families: BTreeMap<String, Vec<Pair>> = BTreeMap::new();
     for &(a, b) in pairs {
@@ -118,10 +121,10 @@ fn by_technique<'a>(pairs: &[Pair<'a>]) -> BTreeMap<String, Vec<Pair<'a>>> {
     families
 }
 
-/// A value of the errors, and whether any growth of it breaks a promise.
+/// Name and accessor of an error value, and true if any increase is a regression.
 type Exact = (&'static str, fn(&Errors) -> Option<f64>, bool);
 
-/// Values compared exactly; larger is worse.
+/// Error values that are compared exactly. Larger is worse for all of them.
 const EXACT: &[Exact] = &[
     ("error_px.rms", |e| Some(e.error_px.rms), false),
     ("error_px.p999", |e| Some(e.error_px.p999), false),
@@ -138,6 +141,7 @@ const EXACT: &[Exact] = &[
     ("pop.max_px", |e| e.pop.as_ref().map(|p| p.max_px), false),
 ];
 
+/// Returns the counts and errors of a case that differ between the runs.
 fn differences(a: &CaseResult, b: &CaseResult, threshold: f64) -> Vec<Difference> {
     let mut values = Vec::new();
     if let (Some(a), Some(b)) = (&a.time, &b.time) {
@@ -155,6 +159,7 @@ fn differences(a: &CaseResult, b: &CaseResult, threshold: f64) -> Vec<Difference
     values.into_iter().filter(|(_, before, after, _)| before != after).map(difference).collect()
 }
 
+/// Lists the cases that only one of the runs contains.
 fn unmatched(a: &Results, b: &Results) -> Vec<String> {
     let lacks = |results: &Results, case: &CaseResult| results.cases.iter().all(|other| other.case != case.case);
     let only_a = a.cases.iter().filter(|case| lacks(b, case)).map(|case| format!("only in A: {}", case.case));
@@ -162,6 +167,7 @@ fn unmatched(a: &Results, b: &Results) -> Vec<String> {
     only_a.chain(only_b).collect()
 }
 
+/// Describes each regression in a sentence.
 fn regressions<'a>(changes: impl Iterator<Item = &'a Change>, differences: &[Difference]) -> Vec<String> {
     let slower = |change: &Change| {
         let Estimate { value, low, high } = change.ratio;

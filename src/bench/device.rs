@@ -1,4 +1,4 @@
-//! The backend that draws on a device: a technique's renderer for each scene, and the measurements of its frames.
+//! Benchmark backend that draws on a Vulkan device: times frames, and measures the error of what was drawn.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -24,24 +24,26 @@ use crate::scene::holes::{Truth, covered, skirts};
 use crate::scene::{self, Copy, SceneRenderer};
 use crate::view::View;
 
-/// Lists of more triangles are not captured: comparing them to their expansion would take minutes.
-const CAPTURED: u64 = 4_000_000;
+/// Largest number of triangles of a list that is captured on the device. Comparing larger captures with the CPU
+/// expansion would take minutes.
+const MAX_CAPTURED: u64 = 4_000_000;
 
-/// Draws on one device with one look.
+/// Draws and measures benchmark cases on one device with one look.
 pub struct DeviceBackend {
     gpu: Arc<Gpu>,
     look: Look,
     techniques: Techniques,
-    /// The scene whose truths are kept, and they, by frame.
+    /// Name of the current scene, and its reference pictures by frame. All cases of the scene share them.
     truths: (String, BTreeMap<usize, Arc<Truth>>),
 }
 
 impl DeviceBackend {
-    /// Draws with a look on a device; the cases name these techniques.
+    /// Creates a backend. `techniques` are those that cases may name.
     pub fn new(gpu: Arc<Gpu>, look: Look, techniques: Techniques) -> Self {
         Self { gpu, look, techniques, truths: Default::default() }
     }
 
+    /// Prepares the technique of a case for a field.
     fn build(&self, case: &Case, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
         let spec: TechniqueSpec = case.technique.parse().map_err(anyhow::Error::msg)?;
         let entry = self.techniques.entry(&spec).map_err(anyhow::Error::msg)?;
@@ -55,8 +57,8 @@ impl DeviceBackend {
         scene::plan(&self.gpu, field, &self.look, None, technique.pipeline_requirements())
     }
 
-    /// A freshly prepared technique and its renderer.
-    fn set(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
+    /// Prepares the technique of a case from scratch, and a renderer for it.
+    fn prepare(&self, scene: &BenchScene) -> Result<(Box<dyn Technique>, SceneRenderer)> {
         let technique = self.build(scene.case, scene.field)?;
         let plan = self.plan(scene.field, technique.as_ref())?;
         let renderer = self.scene(scene.field, &plan).renderer(technique.as_ref(), scene.case.size)?;
@@ -67,7 +69,7 @@ impl DeviceBackend {
         scene::Scene { gpu: &self.gpu, field, plan, look: &self.look, overlay: None }
     }
 
-    /// The truth of a frame: drawn once for all cases of a scene.
+    /// Returns the reference picture of a frame, which is drawn once for all cases of a scene.
     fn truth(&mut self, scene: &BenchScene, frame: usize) -> Result<Arc<Truth>> {
         let name = scene.case.scene();
         if self.truths.0 != name {
@@ -99,7 +101,7 @@ impl BenchBackend for DeviceBackend {
     }
 
     fn time(&mut self, scene: &BenchScene) -> Result<Timed> {
-        let (mut technique, mut renderer) = self.set(scene)?;
+        let (mut technique, mut renderer) = self.prepare(scene)?;
         let has_clock = self.gpu.timestamp_ns > 0.0;
         let mut controller = ToleranceController::new(scene.case);
         let draw = |view: &View| -> Result<FrameSample> {
@@ -131,7 +133,7 @@ impl BenchBackend for DeviceBackend {
     }
 
     fn measure(&mut self, scene: &BenchScene) -> Result<Errors> {
-        let (mut technique, mut renderer) = self.set(scene)?;
+        let (mut technique, mut renderer) = self.prepare(scene)?;
         let mut pool = Pool::default();
         let mut before: Option<(View, Geometry, DrawList)> = None;
         let mut controller = ToleranceController::new(scene.case);
@@ -146,7 +148,7 @@ impl BenchBackend for DeviceBackend {
             if is_measured {
                 let truth = self.truth(scene, frame)?;
                 let fragments = [times.gpu.statistics.map(|[.., run]| run), times.gpu.passed];
-                look(scene, (frame, view), technique.as_ref(), &mut renderer, &truth, fragments, &mut pool)?;
+                measure_frame(scene, (frame, view), technique.as_ref(), &mut renderer, &truth, fragments, &mut pool)?;
                 let plan = self.plan(scene.field, technique.as_ref())?;
                 let drawn = self.scene(scene.field, &plan);
                 pool.hole_pixels(truth.hole_pixels(&drawn, view, &renderer.picture())?.len());
@@ -156,9 +158,9 @@ impl BenchBackend for DeviceBackend {
                     pool.pop(pop::pop(scene.field, old, new));
                 }
             }
-            // What the next frame is held against, if it is measured.
-            let is_wanted = (frame + 1) % scene.case.every == 0;
-            before = is_wanted.then(|| (*view, technique.resident().clone(), renderer.list.clone()));
+            // A measured frame is compared with the one before it.
+            let is_next_measured = (frame + 1) % scene.case.every == 0;
+            before = is_next_measured.then(|| (*view, technique.resident().clone(), renderer.list.clone()));
         }
         pool.finish(scene)
     }
@@ -172,8 +174,9 @@ fn decision(of_plan: plan::Decision) -> Decision {
     Decision { feature: of_plan.feature.to_string(), reason: of_plan.reason, bytes: of_plan.bytes }
 }
 
-/// Measures one frame.
-fn look(
+/// Adds the measurements of the frame that was drawn last to `pool`. `fragments` are the numbers of fragment shader
+/// invocations and of fragments that passed the depth test.
+fn measure_frame(
     scene: &BenchScene,
     (frame, view): (usize, &View),
     technique: &dyn Technique,
@@ -184,7 +187,7 @@ fn look(
 ) -> Result<()> {
     let (field, resident) = (scene.field, technique.resident());
     let picture = renderer.picture();
-    if renderer.list.triangles() <= CAPTURED && renderer.captures() {
+    if renderer.list.triangles() <= MAX_CAPTURED && renderer.captures() {
         let placing = layout::Frame::placing(field, view);
         let expanded = [
             expand::triangles(field, &placing, resident, &renderer.list),

@@ -1,4 +1,4 @@
-//! Goals: a cost to hold along a path, and the deviation from it.
+//! Target cost of every frame on a path, and how well the frames met it.
 
 use std::fmt;
 
@@ -10,21 +10,21 @@ use super::statistics::{Spread, middle};
 use crate::lod::budget::Target;
 use crate::measure::extended;
 
-/// A frame whose cost is within this share of the target holds it.
+/// Largest relative deviation of a frame's cost from its target that still meets the target.
 const BAND: f64 = 0.05;
 
-/// Cost that every frame is held at by moving the tolerance.
+/// Target cost of every frame. The budget controller adjusts the tolerance to reach it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
-    /// Triangles.
+    /// Triangles per frame.
     Triangles(f64),
-    /// Milliseconds from the start of selection until the picture is done.
+    /// Milliseconds per frame, from the start of selection until the device has finished.
     FrameMs(f64),
 }
 
 impl Goal {
-    /// For the controller.
+    /// Returns the target of the budget controller.
     pub fn target(self) -> Target {
         match self {
             Goal::Triangles(count) => Target::Triangles(count),
@@ -32,7 +32,7 @@ impl Goal {
         }
     }
 
-    /// Returns the cost of a frame in the goal's unit.
+    /// Returns the cost of a frame in the goal's unit: its triangles or its milliseconds.
     pub(super) fn cost(self, triangles: u64, frame_ms: f64) -> f64 {
         match self {
             Goal::Triangles(_) => triangles as f64,
@@ -50,26 +50,26 @@ impl fmt::Display for Goal {
     }
 }
 
-/// Deviation from a goal along a path.
+/// How well the frames of a path met their goal. A frame meets the goal if its cost is within 5 % of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct BudgetStats {
-    /// Share, 0 to 1, of the frames within 5 % of the goal.
+    /// Share of all frames that meet the goal, 0 to 1.
     #[schemars(range(max = 1.0))]
     pub within: f64,
-    /// Frames before the first one within it.
+    /// Number of frames before the first one that meets the goal.
     pub settling_frames: f64,
-    /// Share, 0 to 1, of the frames from that one on that are within it; 0 if there is none.
+    /// Share of the frames from the first one that meets the goal on, 0 to 1; 0 if no frame meets it.
     #[schemars(range(max = 1.0))]
     pub settled: f64,
-    /// Largest cost of a frame from that one on, divided by the goal.
+    /// Largest cost among those frames, divided by the goal.
     pub max: f64,
-    /// Tolerances of the frames, pixels.
+    /// Tolerances of all frames, pixels.
     pub tolerance_px: Spread,
 }
 
 impl BudgetStats {
-    /// Of a path's frames.
+    /// Evaluates the frames of a path.
     pub fn of(goal: Goal, frames: &[FrameSample]) -> Self {
         let costs: Vec<f64> =
             frames.iter().map(|frame| goal.cost(frame.triangles, frame.frame_ms) / goal.target().cost()).collect();
@@ -85,7 +85,7 @@ impl BudgetStats {
         }
     }
 
-    /// The median of each value over the rounds; `None` if there is no round.
+    /// Returns the median of each value over the rounds; `None` without rounds.
     pub fn median(rounds: &[BudgetStats]) -> Option<Self> {
         let over = |of: fn(&BudgetStats) -> f64| middle(rounds.iter().map(of));
         (!rounds.is_empty()).then(|| Self {

@@ -1,5 +1,7 @@
-//! `rows.jsonl`: rows appended one by one, each on the disk before the next is begun. A process that is killed
-//! leaves at most one torn line at the end, which is dropped when the run is resumed.
+//! The file `rows.jsonl`: a header and result rows, one JSON document per line.
+//!
+//! Each row is on the disk before the next one is measured. A killed process leaves at most one incomplete line at the
+//! end. It is ignored when reading and removed when the run is resumed.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -10,10 +12,10 @@ use anyhow::{Context, Result, bail};
 use super::rows::{Header, Row, SCHEMA};
 use crate::renamed;
 
-/// Name of the file in a benchmark's directory.
+/// Name of the file in a benchmark's folder.
 pub const ROWS: &str = "rows.jsonl";
 
-/// The file of rows of one run, open for more.
+/// The rows of one run, open for appending.
 pub struct Journal {
     name: String,
     file: File,
@@ -22,8 +24,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the rows of `folder`, or begins them. Rows of a run with another header are refused; its date is not
-    /// compared.
+    /// Opens the rows of a folder, or creates them with this header.
+    ///
+    /// # Errors
+    /// If the file cannot be read or written, or holds rows of a run with another header. Dates may differ.
     pub fn open(folder: &Path, header: Header) -> Result<Self> {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         let path = folder.join(ROWS);
@@ -40,12 +44,15 @@ impl Journal {
         }
         let Row::Header(found) = rows.remove(0) else { bail!("{name}: line 1: expected the header, found a row") };
         if let Some(what) = difference(&found, &header) {
-            bail!("{name}: holds another run's rows, whose {what}; expected the same, or another --out");
+            bail!("{name}: holds the rows of another run: {what}; expected the same run, or another --out");
         }
         Ok(Self { name, file, header: found, rows })
     }
 
-    /// Adds a row; on return it is on the disk.
+    /// Appends a row and waits until it is on the disk.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn append(&mut self, row: Row) -> Result<()> {
         self.write(&row)?;
         self.rows.push(row);
@@ -65,13 +72,16 @@ impl Journal {
         &self.header
     }
 
-    /// The rows so far.
+    /// Returns the rows so far.
     pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 }
 
-/// Reads the header and the rows of a directory; a torn last line is left out.
+/// Reads the header and the rows of a folder. An incomplete last line is ignored.
+///
+/// # Errors
+/// If the file cannot be read, a line is not a row, or the header is missing or of another schema version.
 pub fn read(folder: &Path) -> Result<(Header, Vec<Row>)> {
     let path = folder.join(ROWS);
     let name = path.display().to_string();
@@ -85,6 +95,7 @@ pub fn read(folder: &Path) -> Result<(Header, Vec<Row>)> {
     }
 }
 
+/// Parses complete lines. `name` is the file's, for errors.
 fn parse(text: &[u8], name: &str) -> Result<Vec<Row>> {
     let lines = text.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).enumerate();
     let row = |(k, line)| row(line).with_context(|| format!("{name}: line {}", k + 1));
@@ -97,17 +108,17 @@ fn row(line: &[u8]) -> serde_json::Result<Row> {
     serde_json::from_value(value)
 }
 
-/// Returns the first difference that forbids mixing the rows of two runs.
+/// Describes the first header field in which two runs differ. Rows of such runs must not be mixed.
 fn difference(found: &Header, wanted: &Header) -> Option<String> {
-    let told = |what: &str, a: &dyn std::fmt::Debug, b: &dyn std::fmt::Debug| {
-        (format!("{a:?}") != format!("{b:?}")).then(|| format!("{what} is {a:?} and not {b:?}"))
+    let differ = |what: &str, a: &dyn std::fmt::Debug, b: &dyn std::fmt::Debug| {
+        (format!("{a:?}") != format!("{b:?}")).then(|| format!("its {what} is {a:?} and not {b:?}"))
     };
-    told("schema", &found.schema, &wanted.schema)
-        .or_else(|| told("program", &found.program, &wanted.program))
-        .or_else(|| told("commit", &found.commit, &wanted.commit))
-        .or_else(|| told("list of arguments", &found.arguments, &wanted.arguments))
-        .or_else(|| told("base case", &found.base, &wanted.base))
-        .or_else(|| told("machine", &found.machine, &wanted.machine))
-        .or_else(|| told("device", &found.device, &wanted.device))
-        .or_else(|| told("scene plan", &found.plans, &wanted.plans))
+    differ("schema", &found.schema, &wanted.schema)
+        .or_else(|| differ("program version", &found.program, &wanted.program))
+        .or_else(|| differ("commit", &found.commit, &wanted.commit))
+        .or_else(|| differ("list of arguments", &found.arguments, &wanted.arguments))
+        .or_else(|| differ("base technique", &found.base, &wanted.base))
+        .or_else(|| differ("machine", &found.machine, &wanted.machine))
+        .or_else(|| differ("device", &found.device, &wanted.device))
+        .or_else(|| differ("scene plan", &found.plans, &wanted.plans))
 }

@@ -1,5 +1,7 @@
-//! The public benchmark kit: a fixed list of scenes, so that two people's results can be compared. Only synthetic
-//! fields, which are the same to the bit on every machine; real ones join when their files are given.
+//! The public benchmark kit: a fixed list of scenes, so that results from different machines can be compared.
+//!
+//! Its fields are synthetic and identical on every machine, bit by bit. Height files on the command line are added to
+//! them, along [`REAL_PATHS`].
 
 use std::sync::Arc;
 
@@ -7,25 +9,25 @@ use super::rows::Terrain;
 use crate::height::Field;
 use crate::height::synth::{self, Kind};
 
-/// Version of the list: it grows with any change of what is drawn.
+/// Version of the kit. It increases with every change of the list or of the pictures' size.
 pub const VERSION: u32 = 1;
-/// Paths over real fields that join the kit.
+/// Paths over height files that are measured along with the kit.
 pub const REAL_PATHS: &[&str] = &["circle", "corner"];
 
 /// One scene of the kit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KitScene {
-    /// The family of the field, at 1 m between samples.
+    /// Kind of the synthetic field. Its samples are 1 m apart.
     pub kind: Kind,
-    /// Samples along both sides.
+    /// Samples along each side.
     pub side: u32,
-    /// Its seed.
+    /// Seed of the field.
     pub seed: u64,
-    /// The path over it.
+    /// Name of the camera path.
     pub path: &'static str,
-    /// Frames of the path.
+    /// Number of frames on the path.
     pub frames: usize,
-    /// Distance of the frames at which errors are measured.
+    /// Errors are measured at frames 0, `every`, 2 · `every`, …
     pub every: usize,
 }
 
@@ -37,8 +39,8 @@ const fn scene(kind: Kind, side: u32, seed: u64, path: &'static str) -> KitScene
     KitScene { kind, side, seed, path, frames: 60, every: 5 }
 }
 
-/// Every scene. Those named `peers` are the protocol under which other renderers were measured: 20 frames of warm-up,
-/// 1280 × 720, vertical field of view 45°, errors at every 10th pose.
+/// All scenes. The `peers` scenes follow the protocol under which other terrain renderers were measured: 20 warm-up
+/// frames, 1280 × 720 pixels, 45° vertical field of view, errors at every 10th frame.
 pub const SCENES: &[KitScene] = &[
     peers(513),
     peers(1025),
@@ -54,24 +56,24 @@ pub const SCENES: &[KitScene] = &[
     scene(Kind::Cliff, 513, 1, "corner"),
 ];
 
-/// Frames of warm-up in every scene of the kit.
+/// Warm-up frames before each path of the kit.
 pub const WARM_UP: usize = 20;
-/// Pictures of every scene of the kit, pixels.
+/// Picture size (x, y) of all scenes, pixels.
 pub const SIZE: [u32; 2] = [1280, 720];
 
 impl KitScene {
-    /// The terrain's row.
+    /// Returns the name, size and spacing of the field.
     pub fn terrain(&self) -> Terrain {
         let name = format!("{}-{}", self.kind, self.seed);
         Terrain { name, size: [self.side; 2], spacing_m: [1.0; 2] }
     }
 
-    /// The field and the path.
+    /// Returns field and path, as in "peers-1 2049x2049, fly".
     pub fn name(&self) -> String {
         format!("{}, {}", self.terrain(), self.path)
     }
 
-    /// Makes the field.
+    /// Synthesises the field.
     pub fn field(&self) -> Arc<Field> {
         let mut field = synth::synth(self.kind, [self.side; 2], self.seed);
         field.spacing = [1.0; 2];
@@ -101,7 +103,7 @@ mod tests {
         assert_eq!((WARM_UP, SIZE), (20, [1280, 720]));
     }
 
-    /// A change of a scene needs another version, and this number changes with it.
+    /// Pins the list by its FNV-1a hash: whoever changes a scene must also increase [`VERSION`].
     #[test]
     fn a_change_of_the_list_needs_another_version() {
         let text = format!("{SCENES:?} {WARM_UP} {SIZE:?} {REAL_PATHS:?}");

@@ -1,11 +1,11 @@
-//! The computer that a benchmark ran on, and the memory that the process has held.
+//! Facts about the computer that runs a benchmark, and the peak memory of the process.
 
 use std::fs;
 
 use super::rows::Machine;
 
 impl Machine {
-    /// This one.
+    /// Describes this computer. The processor is "unknown" except on Linux.
     pub fn this() -> Self {
         let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
         Self {
@@ -16,13 +16,13 @@ impl Machine {
     }
 }
 
-/// The most memory that this process has held, bytes; `None` where the system does not say.
+/// Returns the peak resident memory of this process, bytes; `None` except on Linux.
 pub fn host_bytes() -> Option<u64> {
     let kilobytes = field(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM")?;
     kilobytes.trim_end_matches(" kB").parse::<u64>().ok().map(|n| n * 1024)
 }
 
-/// The first value of a key in lines `key: value`.
+/// Returns the first value of a key in lines of the form `key: value`.
 fn field(text: &str, key: &str) -> Option<String> {
     let lines = text.lines().filter_map(|line| line.split_once(':'));
     lines.into_iter().find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim().to_string())

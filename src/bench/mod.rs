@@ -1,6 +1,8 @@
-//! Error against run time: named camera paths, cases run in turn in one process, and the comparison of two runs.
+//! Benchmark of error against run time: named camera paths, interleaved cases, result rows and the comparison of two
+//! runs.
 //!
-//! Rows reach the file one by one. The driver needs no device: a [`BenchBackend`] draws.
+//! [`run`] calls a [`BenchBackend`] to draw and measure, and writes one row at a time. The backend for a Vulkan device
+//! is in the module `device`; everything else works without one.
 
 pub mod compare;
 pub mod controller;

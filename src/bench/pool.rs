@@ -1,4 +1,4 @@
-//! Pools the measurements of all frames of a case into its [`Errors`].
+//! Combines the measurements of all frames of a case into its [`Errors`].
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::measure::watertight::{CounterExample, Proof};
 use crate::measure::{beyond, peers, summary};
 use crate::view::View;
 
-/// Samples of the largest field for which near-optimal meshes are built: larger ones take minutes.
+/// Largest number of samples of a field for which near-optimal meshes are built. Larger ones would take minutes.
 const REFERENCE_SAMPLES: u64 = 1100 * 1100;
 
 /// Measurements of all frames so far.
@@ -29,10 +29,11 @@ pub struct Pool {
     metres: summary::Pool,
     pixels: summary::Pool,
     silhouette: summary::Pool,
+    /// Screen error divided by the tolerance, by the angle off the view axis.
     off_axis: [summary::Pool; geometric::ANGLES],
-    /// Samples in view, and those of them within the tolerance.
+    /// Number of samples in view, and of those within the tolerance, over all frames.
     samples: [f64; 2],
-    /// Number of the frame with the largest screen error, and that error, pixels.
+    /// Frame with the largest screen error, and that error, pixels.
     worst: Option<(usize, f64)>,
     counter_example: Option<String>,
     as_drawn: Option<bool>,
@@ -40,9 +41,9 @@ pub struct Pool {
     skirt_pixels: u64,
     pop: Option<Pop>,
     triangles: Option<Triangles>,
-    /// Fragments run, and fragments that passed the depth test.
+    /// Fragment shader invocations, and fragments that passed the depth test; `None` if the device does not count them.
     fragments: [Option<u64>; 2],
-    /// Pixels covered by terrain.
+    /// Pixels covered by terrain, all frames.
     covered: u64,
     peers: peers::Pool,
     pictures: Vec<pictures::Difference>,
@@ -70,7 +71,7 @@ impl Pool {
         }
     }
 
-    /// Adds a frame with pending refinements: its largest screen error, pixels, and its depth buffer.
+    /// Adds a frame with pending data: its largest screen error, pixels, and its depth buffer.
     pub fn pending(&mut self, field: &Field, view: &View, max_px: f64, depth: &[f32]) {
         let excess_px = (max_px - view.tolerance.px).max(0.0);
         self.pending.frames += 1;
@@ -79,29 +80,29 @@ impl Pool {
         self.pending.excess_px = self.pending.excess_px.max(excess_px);
     }
 
-    /// Adds the result of a frame's proof; the first counter-example is kept.
+    /// Adds the result of a frame's proof of watertightness. The first counter-example is kept.
     pub fn proof(&mut self, frame: usize, proof: Result<Proof, Box<CounterExample>>) {
         if let Err(found) = proof {
             self.counter_example.get_or_insert_with(|| format!("frame {frame}: {found}"));
         }
     }
 
-    /// Adds the comparison of a frame's captured triangles with its draw list.
+    /// Adds a frame whose triangles were captured on the device: true if they equal those of its draw list.
     pub fn captured(&mut self, is_equal: bool) {
         *self.as_drawn.get_or_insert(true) &= is_equal;
     }
 
-    /// Adds pixels where the sky shines through terrain.
+    /// Adds a frame's number of pixels where the sky shows through terrain.
     pub fn hole_pixels(&mut self, pixels: usize) {
         self.hole_pixels += pixels as u64;
     }
 
-    /// Adds pixels that show a skirt.
+    /// Adds a frame's number of pixels that show a skirt.
     pub fn skirt_pixels(&mut self, pixels: usize) {
         self.skirt_pixels += pixels as u64;
     }
 
-    /// Adds the displacement of the surface at a frame.
+    /// Adds the displacement of the surface from the previous frame to this one.
     pub fn pop(&mut self, pop: Pop) {
         match &mut self.pop {
             None => self.pop = Some(pop),
@@ -109,19 +110,24 @@ impl Pool {
         }
     }
 
-    /// Adds a frame's triangles, its fragments (run, past the depth test) and the pixels covered by terrain.
+    /// Adds a frame's triangles, its fragments (shader invocations, and those that passed the depth test) and its
+    /// number of pixels covered by terrain.
     pub fn triangles(&mut self, triangles: &Triangles, fragments: [Option<u64>; 2], covered: u64) {
         self.triangles.get_or_insert_default().merge(triangles);
         self.fragments = [0, 1].map(|k| fragments[k].map(|n| n + self.fragments[k].unwrap_or(0)));
         self.covered += covered;
     }
 
-    /// Adds a frame's depth buffer to the peers' metric.
+    /// Adds a frame's depth buffer to the metric of other renderers ([`peers`]).
     pub fn peers(&mut self, field: &Field, view: &View, depth: &[f32]) {
         self.peers.add(field, view, depth);
     }
 
-    /// Compares a frame's picture with the reference picture. Must follow [`Pool::errors`] of the same frame.
+    /// Adds the difference of a frame's picture from the reference picture. Must follow [`Pool::errors`] of the same
+    /// frame.
+    ///
+    /// # Errors
+    /// If the pictures differ in size.
     pub fn picture(&mut self, frame: usize, picture: &RgbaImage, truth: &RgbaImage) -> Result<()> {
         let [picture, truth] = [picture, truth].map(|rgba| image::DynamicImage::from(rgba.clone()).into_rgb8());
         let (stats, difference) = pictures::compare(&picture, &truth)?;
@@ -132,7 +138,10 @@ impl Pool {
         Ok(())
     }
 
-    /// Returns the case's errors and writes the pictures of its worst frame.
+    /// Returns the errors of the case, and writes the pictures of its worst frame.
+    ///
+    /// # Errors
+    /// If a near-optimal mesh cannot be built or a picture cannot be written.
     pub fn finish(self, scene: &BenchScene) -> Result<Errors> {
         let within = Within {
             frames: self.kept as f64 / self.frames.max(1) as f64,
@@ -160,6 +169,7 @@ impl Pool {
         })
     }
 
+    /// Returns the bins of angles that have samples.
     fn by_angle(&self) -> Vec<AngleBin> {
         let bin = |(k, pool): (usize, &summary::Pool)| {
             let summary = pool.summary();
@@ -169,7 +179,7 @@ impl Pool {
         self.off_axis.iter().enumerate().filter(|(_, pool)| !pool.is_empty()).map(bin).collect()
     }
 
-    /// Writes the pictures of the worst frame.
+    /// Writes the pictures of the frame with the largest screen error.
     fn worst(&self, scene: &BenchScene) -> Result<Option<Worst>> {
         let (Some((frame, error_px)), Some((picture, difference))) = (self.worst, &self.worst_pictures) else {
             return Ok(None);
@@ -179,8 +189,8 @@ impl Pool {
         Ok(Some(Worst { frame, error_px, picture, difference }))
     }
 
-    /// Builds near-optimal meshes of the field at the case's largest vertical error; `None` if that is 0 or infinite,
-    /// or the field too large.
+    /// Builds near-optimal meshes of the field within the case's largest vertical error. Returns `None` if that is 0
+    /// or infinite, or the field is too large.
     fn reference(&self, scene: &BenchScene) -> Result<Option<Reference>> {
         let [columns, rows] = scene.field.size().map(u64::from);
         let error_m = self.metres.summary().max;
@@ -189,7 +199,7 @@ impl Pool {
         }
         let delaunay = reference::greedy(scene.field, error_m)?.triangles;
         let rtin = reference::rtin(scene.field, error_m)?.triangles;
-        // Share of the mesh in view.
+        // Mean share of the field's samples in view: the same share of the whole mesh is comparable.
         let in_view = self.samples[0] / (self.frames as f64 * (columns * rows) as f64);
         let drawn = self.triangles.as_ref().map_or(0, |all| all.shown + all.facing_away) as f64 / self.frames as f64;
         let multiple = (in_view > 0.0).then(|| drawn / (delaunay as f64 * in_view));
@@ -197,7 +207,7 @@ impl Pool {
     }
 }
 
-/// Writes a picture of a case and returns its name relative to the folder.
+/// Writes a picture of a case to the folder `pictures`. Returns its path relative to the benchmark's folder.
 fn save_picture(scene: &BenchScene, what: &str, picture: &RgbImage) -> Result<String> {
     let mut name: String =
         format!("{}-{what}", scene.case).chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();

@@ -1,4 +1,4 @@
-//! `results.json` and `results.csv`: the rows of a directory, summed up case by case.
+//! The files `results.json` and `results.csv`: a summary of each case's rows.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -17,12 +17,12 @@ use crate::height::save::replace;
 use crate::measure::extended::{self, Extended};
 use crate::renamed;
 
-/// Name of the file with everything.
+/// Name of the file with all results.
 pub const RESULTS: &str = "results.json";
-/// Name of the table with a line a case.
+/// Name of the table with one line per case.
 pub const TABLE: &str = "results.csv";
 
-/// Results of a benchmark.
+/// Results of a benchmark run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Results {
     /// Version of the format.
@@ -30,7 +30,7 @@ pub struct Results {
     pub schema: u32,
     /// Properties that all cases share.
     pub header: Header,
-    /// The cases in the order of their first run.
+    /// The cases in the order of their first rows.
     pub cases: Vec<CaseResult>,
 }
 
@@ -39,15 +39,15 @@ pub struct Results {
 pub struct CaseResult {
     /// The case.
     pub case: Case,
-    /// Summary of its rounds; `None` if it was not timed.
+    /// Summary of all rounds; `null` if the case was not timed.
     pub time: Option<TimeSummary>,
-    /// Its errors, if measured.
+    /// Errors; `null` if not measured.
     pub errors: Option<Errors>,
-    /// Its rounds.
+    /// Times of each round.
     pub rounds: Vec<Times>,
 }
 
-/// Summary of a case's rounds. Each value is the median over the rounds.
+/// Summary of the rounds of one case. Values are medians over the rounds unless stated otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct TimeSummary {
@@ -55,9 +55,9 @@ pub struct TimeSummary {
     pub frame_ms: Estimate,
     /// 95th percentile of the frame times, milliseconds.
     pub frame_p95_ms: f64,
-    /// 99th percentile.
+    /// 99th percentile of the frame times, milliseconds.
     pub frame_p99_ms: f64,
-    /// The longest frame of a round.
+    /// Longest frame time of a round, milliseconds.
     pub frame_max_ms: f64,
     /// Median selection time, milliseconds.
     pub select_ms: f64,
@@ -65,42 +65,44 @@ pub struct TimeSummary {
     pub record_ms: f64,
     /// Median device time, milliseconds.
     pub gpu_ms: Option<f64>,
-    /// Median time of copying to the device, milliseconds.
+    /// Median time of writing data for the device and recording its uploads, milliseconds.
     pub upload_ms: Option<f64>,
-    /// Median time of the same picture in one full-screen pass, milliseconds.
+    /// Median frame time of the shading-only baseline, milliseconds.
     pub shading_only_ms: Option<f64>,
-    /// Frame time divided by the shading-only time, round by round.
+    /// Median frame time divided by that of the shading-only baseline, round by round.
     pub over_shading_only: Option<Estimate>,
-    /// Frame time divided by that of the base case of the same scene, round by round.
+    /// Median frame time divided by that of the base technique in the same scene, round by round. The base case has the
+    /// same tolerance, metric and settings where one exists.
     pub over_base: Option<Estimate>,
-    /// Median of selection and recording together, the host's part of a frame, milliseconds.
+    /// Median selection time plus median recording time, milliseconds.
     pub cpu_ms: Estimate,
-    /// The same divided by that of the base case.
+    /// `cpu_ms` divided by that of the base case, round by round.
     pub cpu_over_base: Option<Estimate>,
-    /// Share of hitches, percent.
+    /// Share of frames longer than twice their round's median, all rounds together, percent.
     pub hitches_percent: f64,
-    /// Mean triangles a frame.
+    /// Mean triangles per frame.
     pub triangles: f64,
-    /// Mean draws a frame.
+    /// Mean draws per frame.
     pub draws: f64,
-    /// Mean draw commands a frame.
+    /// Mean draw commands per frame.
     pub commands: f64,
-    /// Largest factor by which a frame's tolerance grew because its list did not fit the buffers: 1 if none did.
+    /// Largest factor in any round by which a frame's tolerance was scaled so that its list fits the buffers. 1 if all
+    /// lists fitted.
     #[serde(with = "extended", default = "unscaled")]
     #[schemars(with = "Extended", extend("minimum" = 1))]
     pub tolerance_scale: f64,
-    /// Deviation from the goal, if there is one.
+    /// How well the frames met the case's goal; `null` without a goal.
     #[serde(default)]
     pub budget: Option<BudgetStats>,
-    /// Device bytes, all purposes together.
+    /// Device memory in use, all purposes together, bytes: the largest of any round.
     pub device_bytes: u64,
-    /// Statistics of the technique, by name.
+    /// Statistics of the technique after the last round, by name.
     #[serde(default)]
     pub stats: BTreeMap<String, f64>,
 }
 
 impl Results {
-    /// Sums rows up. A row that is there twice counts once: the first time.
+    /// Summarises rows. Of several rows for one case and round only the first counts.
     pub fn of(header: Header, rows: &[Row]) -> Self {
         let mut cases: Vec<CaseResult> = Vec::new();
         for row in rows {
@@ -124,7 +126,10 @@ impl Results {
         Self { schema: SCHEMA, header, cases }
     }
 
-    /// Sums the rows of a directory up.
+    /// Reads and summarises the rows of a benchmark's folder.
+    ///
+    /// # Errors
+    /// As [`journal::read`].
     pub fn read(folder: &Path) -> Result<Self> {
         let (header, rows) = journal::read(folder)?;
         Ok(Self::of(header, &rows))
@@ -132,12 +137,13 @@ impl Results {
 }
 
 impl CaseResult {
-    /// Returns true if terrain was missing: a crack or a hole.
+    /// Returns true if the proof of watertightness failed in a frame, or the sky showed through terrain.
     pub fn is_torn(&self) -> bool {
         self.errors.as_ref().is_some_and(|e| e.watertight == Some(false) || e.hole_pixels.is_some_and(|n| n > 0))
     }
 }
 
+/// Returns the result of a case, which is added if it is new.
 fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult {
     let at = cases.iter().position(|result| result.case == *case).unwrap_or_else(|| {
         cases.push(CaseResult { case: case.clone(), time: None, errors: None, rounds: Vec::new() });
@@ -146,7 +152,8 @@ fn entry<'a>(cases: &'a mut Vec<CaseResult>, case: &Case) -> &'a mut CaseResult 
     &mut cases[at]
 }
 
-/// The base case of a case's scene: that of the same tolerance and settings where there is one.
+/// Returns the case of the base technique that is most like a case of the same scene. Equal goals count most, then
+/// tolerance, metric and settings.
 fn base_of<'a>(of: &CaseResult, cases: &'a [CaseResult], base: &str) -> Option<&'a CaseResult> {
     let of = &of.case;
     let unlike = |case: &Case| {
@@ -157,6 +164,7 @@ fn base_of<'a>(of: &CaseResult, cases: &'a [CaseResult], base: &str) -> Option<&
     all.min_by_key(|result| unlike(&result.case))
 }
 
+/// Summarises the rounds of a case; `None` without rounds.
 fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary> {
     let rounds = &result.rounds;
     if rounds.is_empty() {
@@ -173,7 +181,7 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
     let median = |cost: Cost| Estimate::median(&rounds.iter().map(cost).collect::<Vec<_>>());
     let shading_only: Option<Vec<f64>> =
         rounds.iter().map(|r| r.shading_only_ms.map(|shading_only| r.frame_ms.p50 / shading_only.p50)).collect();
-    // Rows are text that anyone may have written: sums of any numbers are no fault.
+    // Files may be edited by hand: absurd numbers must not overflow.
     let frames = rounds.len().saturating_mul(result.case.frames).max(1);
     Some(TimeSummary {
         frame_ms: median(frame_ms),
@@ -200,11 +208,12 @@ fn summary(result: &CaseResult, base: Option<&CaseResult>) -> Option<TimeSummary
     })
 }
 
+/// Returns the device memory of a round, bytes, without overflow.
 fn device_bytes(round: &Times) -> u64 {
     round.device_bytes.values().fold(0, |all, bytes| all.saturating_add(*bytes))
 }
 
-/// A time of a round, milliseconds.
+/// Accessor of a round's time, milliseconds.
 type Cost = fn(&Times) -> f64;
 
 fn frame_ms(round: &Times) -> f64 {
@@ -215,19 +224,23 @@ fn cpu_ms(round: &Times) -> f64 {
     round.select_ms.p50 + round.record_ms.p50
 }
 
-/// A cost over the base's, round by round where both have the round.
+/// Returns a time divided by that of `base`, for each round that both have.
 fn pairs(rounds: &[Times], base: &[Times], cost: Cost) -> Vec<f64> {
     let partner = |round: usize| base.iter().find(|other| other.round == round);
     rounds.iter().filter_map(|r| partner(r.round).map(|other| cost(r) / cost(other))).collect()
 }
 
-/// The frame time of a case over that of another, pair by pair within a round; `None` if no round has both.
+/// Returns the median frame time of one case divided by that of another, round by round; `None` if they have no round
+/// in common.
 pub fn frame_ratio(of: &CaseResult, over: &CaseResult) -> Option<Estimate> {
     let ratios = pairs(&of.rounds, &over.rounds, frame_ms);
     (!ratios.is_empty()).then(|| Estimate::median(&ratios))
 }
 
-/// Writes both files from the rows of a directory and returns the path of `results.json`.
+/// Writes both files from the rows of a benchmark's folder. Returns the path of `results.json`.
+///
+/// # Errors
+/// If the rows cannot be read or a file cannot be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let results = Results::read(folder)?;
     let path = folder.join(RESULTS);
@@ -239,12 +252,15 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Writes a file whole or leaves what was there.
+/// Writes a file. If that fails, an existing file of this name is unchanged.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, |out| out.write_all(bytes)).with_context(|| path.display().to_string())
 }
 
-/// A line a case: every single value of it, under its path in `results.json`.
+/// Returns the table as CSV: one line per case, one column per value, named by its path in `results.json`.
 fn table(results: &Results) -> Result<Vec<u8>> {
     let mut lines: Vec<Vec<(String, String)>> = Vec::new();
     let mut columns: Vec<String> = Vec::new();
@@ -267,7 +283,7 @@ fn table(results: &Results) -> Result<Vec<u8>> {
     Ok(writer.into_inner()?)
 }
 
-/// Single values by their path; lists of anything but numbers have no place in a line.
+/// Collects the values of a JSON document by their path. Lists of anything but numbers are left out.
 fn flatten(path: &str, value: &Value, cells: &mut Vec<(String, String)>) {
     let below = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
     match value {

@@ -1,7 +1,7 @@
-//! Rows of a benchmark: one line of `rows.jsonl` each, and the parts of `results.json`.
+//! The rows of a benchmark: the lines of `rows.jsonl`, which are also the parts of `results.json`.
 //!
-//! `docs/results-schema.md` documents them with a JSON Schema that is generated from these types. A value that is
-//! `None`, or an empty list, was not measured.
+//! `docs/results-schema.md` contains a JSON Schema that is generated from these types and their comments. `None` and
+//! empty lists mean that a value was not measured.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -20,7 +20,7 @@ use crate::measure::pop::Pop;
 use crate::measure::reference::Reference;
 use crate::measure::summary::Summary;
 
-/// Version of rows and results. It grows when a reader of older versions would misread the new ones.
+/// Version of rows and results. It increases with changes that readers of older versions would misunderstand.
 pub const SCHEMA: u32 = 1;
 
 /// One line of `rows.jsonl`.
@@ -29,13 +29,13 @@ pub const SCHEMA: u32 = 1;
 pub enum Row {
     /// The first line.
     Header(Header),
-    /// The times of one case in one round.
+    /// Times of one case in one round.
     Time(TimeRow),
-    /// The errors of one case.
+    /// Errors of one case.
     Error(ErrorRow),
 }
 
-/// Properties that all rows of a directory share.
+/// Properties that all rows of a folder share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub struct Header {
@@ -44,26 +44,26 @@ pub struct Header {
     pub schema: u32,
     /// Version of the program.
     pub program: String,
-    /// Git commit of the program, if it was built in a clone.
+    /// Git commit of the program; `null` if it was not built in a git checkout.
     pub commit: Option<String>,
-    /// Start of the first row, RFC 3339, UTC.
+    /// Start of the run, RFC 3339, UTC.
     pub date: String,
-    /// Command-line arguments.
+    /// Command-line arguments that determine the cases, in a fixed order and spelling.
     pub arguments: Vec<String>,
-    /// Technique by whose times the others' are divided, round by round.
+    /// Base technique: times of other techniques are divided by its times, round by round.
     pub base: String,
     /// The computer.
     pub machine: Machine,
     /// The Vulkan device.
     pub device: Device,
-    /// The plan of each terrain's scene.
+    /// Scene plan of each terrain.
     pub plans: Vec<Plan>,
 }
 
 /// The computer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Machine {
-    /// Model of the processor.
+    /// Model of the processor, or "unknown".
     pub cpu: String,
     /// Hardware threads.
     pub cores: usize,
@@ -78,206 +78,208 @@ pub struct Device {
     pub name: String,
     /// Name and version of its driver.
     pub driver: String,
-    /// True for a software device.
+    /// True for a software device, which draws on the processor.
     pub is_cpu: bool,
 }
 
-/// The plan of one terrain's scene.
+/// Scene plan of one terrain: the features that its pipelines and buffers have.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Plan {
     /// Name of the terrain.
     pub terrain: String,
-    /// Features that the scene needed.
+    /// Features that the scene needs.
     pub kept: Vec<Decision>,
-    /// Features that were left out.
+    /// Features that it leaves out.
     pub left_out: Vec<Decision>,
 }
 
-/// One feature of a plan.
+/// One feature of a scene plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Decision {
     /// Name of the feature.
     pub feature: String,
     /// Reason for the decision.
     pub reason: String,
-    /// Device bytes used, or saved by leaving it out.
+    /// Device memory that it uses, or that leaving it out saves, bytes.
     pub bytes: u64,
 }
 
-/// One configuration: rows with equal cases may be compared.
+/// One configuration. Rows with equal cases may be compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Case {
     /// The terrain.
     pub terrain: Terrain,
     /// `technique` or `technique:variant`.
     pub technique: String,
-    /// Settings that differ from the technique's defaults.
+    /// Settings given on the command line, by key.
     pub settings: BTreeMap<String, String>,
-    /// Allowed screen error, pixels; with a goal, that of the first frame.
+    /// Tolerance: largest allowed screen error, pixels. With a goal, that of the first frame.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance_px: f64,
-    /// Cost that every frame is held at by moving the tolerance.
+    /// Target cost of every frame, if the tolerance is adjusted to reach one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<Goal>,
-    /// `certified` or `paper`.
+    /// Formula that converts metres of error to pixels: `certified` or `paper`.
     #[schemars(extend("enum" = ["certified", "paper"]))]
     pub metric: String,
     /// Name of the camera path.
     pub path: String,
     /// Picture size (x, y), pixels.
     pub size: [u32; 2],
-    /// Frames of the path.
+    /// Number of frames on the path.
     pub frames: usize,
-    /// Distance of measured frames: errors are measured at frame 0 and every `every`th one after it.
+    /// Errors are measured at frames 0, `every`, 2 · `every`, …
     pub every: usize,
 }
 
-/// A terrain by name.
+/// A terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Terrain {
-    /// Name of the file, or of the synthetic field with its seed.
+    /// Name of the file without its extension, or kind and seed of a synthetic field.
     pub name: String,
-    /// Samples (x, z).
+    /// Number of samples (x, z).
     pub size: [u32; 2],
-    /// Distance of neighbouring samples (x, z), metres.
+    /// Distance between samples (x, z), metres.
     pub spacing_m: [f64; 2],
 }
 
-/// One round of one case.
+/// Times of one case in one round.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub struct TimeRow {
     /// The case.
     pub case: Case,
-    /// Its times.
+    /// Times of the round.
     #[serde(flatten)]
     pub times: Times,
 }
 
-/// Times of one pass along the path, milliseconds a frame. Warm-up frames are left out.
+/// Times of one pass along the path, milliseconds per frame. Warm-up frames are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Times {
     /// Number of the round, from 0.
     pub round: usize,
-    /// From the start of selection until the picture is done.
+    /// Frame time, from the start of selection until the device has finished.
     pub frame_ms: Percentiles,
-    /// Selection.
+    /// Host time of selecting the level of detail.
     pub select_ms: Percentiles,
-    /// Recording of commands.
+    /// Host time of recording commands.
     pub record_ms: Percentiles,
-    /// Device time, by timestamps.
+    /// Device time of all passes, by timestamps.
     pub gpu_ms: Option<Percentiles>,
-    /// Copying to the device.
+    /// Host time of writing data for the device and recording its uploads.
     pub upload_ms: Option<Percentiles>,
-    /// The same view with the same fragment work in one full-screen pass.
+    /// Frame time of the shading-only baseline: one full-screen pass that does the same fragment work without
+    /// triangles.
     pub shading_only_ms: Option<Percentiles>,
-    /// Time of every frame in order; `frame_ms` are their percentiles.
+    /// Frame time of every frame, in order; `frame_ms` has their percentiles.
     #[serde(default)]
     pub frames_ms: Vec<f64>,
-    /// The `shading_only` time of every frame; empty if not measured.
+    /// Shading-only frame time of every frame, in order; empty if not measured.
     #[serde(default)]
     pub shading_only_frames_ms: Vec<f64>,
-    /// Frames longer than twice the median.
+    /// Number of frames longer than twice the median.
     pub hitches: usize,
-    /// Triangles drawn a frame.
+    /// Triangles per frame.
     pub triangles: Spread,
-    /// Vertex shader invocations a frame.
+    /// Vertex shader invocations per frame.
     pub vertices: Option<Spread>,
-    /// Draws in the draw list a frame.
+    /// Draws in the draw list per frame.
     pub draws: Spread,
-    /// Draw commands recorded a frame.
+    /// Draw commands recorded per frame.
     pub commands: Spread,
-    /// Largest factor by which a frame's tolerance grew because its list did not fit the buffers: 1 if none did.
+    /// Largest factor by which a frame's tolerance was scaled so that its list fits the buffers. 1 if all lists fitted.
     #[serde(with = "extended", default = "unscaled")]
     #[schemars(with = "Extended", extend("minimum" = 1))]
     pub tolerance_scale: f64,
-    /// Largest number, of any frame, of visible instances coarser than the tolerance because a refinement was not on
-    /// the device yet.
+    /// Largest number, in any frame, of visible instances that are coarser than the tolerance allows because finer data
+    /// is not on the device yet.
     #[serde(default)]
     pub pending: u64,
-    /// Frames with such instances.
+    /// Number of frames with such instances.
     #[serde(default)]
     pub pending_frames: usize,
-    /// Deviation from the goal, if there is one.
+    /// How well the frames met the case's goal; `null` without a goal.
     #[serde(default)]
     pub budget: Option<BudgetStats>,
-    /// Tolerance of every frame, pixels, if there is a goal.
+    /// Tolerance of every frame, pixels, in order; empty without a goal.
     #[serde(default)]
     #[schemars(extend("items" = {"type": "number", "exclusiveMinimum": 0}))]
     pub tolerances_px: Vec<f64>,
-    /// Device bytes by purpose, the largest of any frame.
+    /// Device memory in use after the last frame, by purpose, bytes.
     pub device_bytes: BTreeMap<String, u64>,
     /// Statistics of the technique after the last frame, by name.
     #[serde(default)]
     pub stats: BTreeMap<String, f64>,
-    /// Peak memory of the process, bytes.
+    /// Peak resident memory of the process so far, bytes; `null` where the system does not report it.
     pub host_bytes: Option<u64>,
 }
 
-/// The errors of one case.
+/// Errors of one case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub struct ErrorRow {
     /// The case.
     pub case: Case,
-    /// Its errors.
+    /// Errors of the case.
     #[serde(flatten)]
     pub errors: Errors,
 }
 
-/// Errors of a case, pooled over all measured frames.
+/// Errors of a case over all measured frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Errors {
-    /// Frames measured.
+    /// Number of frames measured.
     pub frames: usize,
-    /// Exact screen error, pixels.
+    /// Screen error: distance between a sample and the drawn point above or below it, both projected, pixels.
     pub error_px: Summary,
-    /// Vertical error, metres.
+    /// Vertical distance between a sample and the drawn surface, metres.
     pub error_m: Summary,
-    /// Screen error in the silhouette band, pixels.
+    /// Screen error of samples on silhouettes, where the terrain turns away from the eye, pixels.
     pub silhouette_px: Option<Summary>,
-    /// Share of frames and samples within the tolerance.
+    /// Shares of frames and samples within the tolerance.
     pub within: Option<Within>,
     /// Screen error divided by the tolerance, by the angle off the view axis.
     pub by_angle: Vec<AngleBin>,
-    /// Pictures against those of brute force.
+    /// Difference of the pictures from those of brute force.
     pub image: Option<ImageError>,
-    /// Displacement when the level of detail changes.
+    /// Displacement of the surface from frame to frame when the level of detail changes.
     pub pop: Option<Pop>,
-    /// True if every frame was proven watertight.
+    /// True if every measured frame was proven watertight.
     pub watertight: Option<bool>,
-    /// The first violation where one was not.
+    /// First frame that is not watertight, and the triangles at fault.
     pub counter_example: Option<String>,
-    /// True if the triangles captured on the device equal those of the draw list, bit by bit, in every frame.
+    /// True if the triangles captured on the device equal those of the draw list, bit by bit, in every frame captured.
     pub as_drawn: Option<bool>,
-    /// Pixels where the sky shines through terrain, all frames.
+    /// Number of pixels where the sky shows through terrain, all frames.
     pub hole_pixels: Option<u64>,
-    /// Pixels that show a skirt, all frames.
+    /// Number of pixels that show a skirt, all frames.
     pub skirt_pixels: Option<u64>,
-    /// Share of triangles that are small or hidden, and overdraw.
+    /// Shares of small and of hidden triangles, and overdraw.
     pub economy: Option<Economy>,
-    /// Near-optimal meshes of the same vertical error.
+    /// Near-optimal meshes with the same vertical error.
     pub reference: Option<Reference>,
-    /// The peers' metric.
+    /// Error as other terrain renderers were measured, pixels.
     pub peers_px: Option<PeersError>,
     /// The frame with the largest screen error.
     pub worst: Option<Worst>,
-    /// Frames with pending refinements.
+    /// Frames with pending data.
     #[serde(default)]
     pub pending: Option<PendingFrames>,
 }
 
-/// Frames with pending refinements: only these may exceed a certified bound.
+/// Measured frames with instances that are too coarse because finer data is not on the device yet. Only such frames may
+/// exceed a certified tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PendingFrames {
-    /// Such frames, of those measured.
+    /// Number of such frames.
     pub frames: usize,
-    /// Such frames that kept the tolerance.
+    /// Number of such frames that are within the tolerance all the same.
     pub kept: usize,
-    /// Their pixels beyond the tolerance.
+    /// Number of pixels beyond the tolerance in these frames.
     pub pixels: u64,
-    /// Largest excess of their screen error over the tolerance, pixels.
+    /// Largest excess of the screen error over the tolerance in these frames, pixels.
     #[serde(with = "extended")]
     #[schemars(with = "Extended", extend("minimum" = 0))]
     pub excess_px: f64,
@@ -287,29 +289,29 @@ pub struct PendingFrames {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Within {
-    /// Share of the frames.
+    /// Share of the measured frames whose largest screen error is within the tolerance.
     pub frames: f64,
-    /// Share of the samples in view.
+    /// Share of the samples in view whose screen error is within the tolerance.
     pub samples: f64,
 }
 
 /// The frame with the largest screen error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Worst {
-    /// Its number on the path.
+    /// Number of the frame on the path, from 0.
     pub frame: usize,
-    /// Its largest screen error, pixels.
+    /// Largest screen error, pixels.
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub error_px: f64,
-    /// File of its picture, relative to the directory.
+    /// File with the picture, relative to the benchmark's folder.
     pub picture: Option<String>,
-    /// File of the difference from the reference picture.
+    /// File with the FLIP difference from the reference picture, relative to the benchmark's folder.
     pub difference: Option<String>,
 }
 
 impl Case {
-    /// Returns technique, settings, metric and goal: the label of one line of a plot.
+    /// Returns technique, settings, metric and goal: the label of one line in a chart.
     pub fn series(&self) -> String {
         let settings: Vec<_> = self.settings.iter().map(|(key, value)| format!(" {key}={value}")).collect();
         let metric = if self.metric == "certified" { "" } else { " (paper metric)" };
@@ -317,14 +319,15 @@ impl Case {
         format!("{}{}{metric}{goal}", self.technique, settings.concat())
     }
 
-    /// Returns terrain, path, picture size and frames: cases of one scene differ only in how it is drawn.
+    /// Returns terrain, path, picture size and number of frames: the label of a scene. Cases of one scene differ only
+    /// in how it is drawn.
     pub fn scene(&self) -> String {
         let Self { terrain, path, size: [w, h], frames, .. } = self;
         format!("{terrain}, {path}, {w}x{h}, {frames} frames")
     }
 }
 
-/// The case in words; different cases have different words.
+/// Writes the scene, the series and the tolerance, which together identify a case.
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}, {} px", self.scene(), self.series(), self.tolerance_px)
@@ -337,7 +340,7 @@ impl fmt::Display for Terrain {
     }
 }
 
-/// The scale of a tolerance that was kept; the default for rows of older versions.
+/// Returns 1, the tolerance scale of lists that fit; the default for rows of older versions.
 pub(super) fn unscaled() -> f64 {
     1.0
 }

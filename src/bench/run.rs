@@ -1,7 +1,7 @@
-//! The driver of a benchmark.
+//! Runs all cases of a benchmark and writes their rows.
 //!
-//! Cases of one scene take turns within a round (A B A B …), so that a temporary slowdown of the machine affects all of
-//! them. Warm-up frames are dropped. Every row is on the disk before the next one starts.
+//! The cases of a scene alternate (A B A B …), one round after the other. A temporary slowdown of the machine then
+//! affects all of them. Warm-up frames are not counted. Each row is on the disk before the next one is measured.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,33 +24,33 @@ use crate::view::{Metric, Tolerance, View};
 /// A frame longer than this many medians is a hitch.
 const HITCH: f64 = 2.0;
 
-/// One case, as given to a backend.
+/// One case for a backend to draw.
 pub struct BenchScene<'a> {
     /// The case.
     pub case: &'a Case,
     /// The field.
     pub field: &'a Arc<Field>,
-    /// One view a frame, in order, with the case's tolerance. A goal moves it
-    /// ([`ToleranceController`](super::controller::ToleranceController)).
+    /// One view per frame, in order, with the case's tolerance. If the case has a goal, the backend adjusts the
+    /// tolerance with a [`ToleranceController`](super::controller::ToleranceController).
     pub views: &'a [View],
-    /// The folder for pictures: file names in [`Errors`] are relative to it.
+    /// Folder for pictures. File names in [`Errors`] are relative to it.
     pub folder: &'a Path,
 }
 
 /// Measurements of one pass along a path.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timed {
-    /// One a view.
+    /// One sample per view, in order.
     pub frames: Vec<FrameSample>,
-    /// Device bytes by purpose, the most of any frame.
+    /// Device memory in use after the last frame, by purpose, bytes.
     pub device_bytes: BTreeMap<String, u64>,
     /// Statistics of the technique after the last frame, by name.
     pub stats: BTreeMap<String, f64>,
 }
 
-/// A renderer to be measured. It is called for the scenes in turn and may keep data between calls.
+/// A renderer to measure. All cases of a scene are passed to it before the next scene, so it may cache data of a scene.
 pub trait BenchBackend {
-    /// The device, and the plan of each terrain's scene.
+    /// Describes the device, and the plan of each terrain's scene.
     fn describe(&mut self, fields: &[(Terrain, Arc<Field>)]) -> Result<(Device, Vec<Plan>)>;
 
     /// Draws every view once, in order, starting with a freshly prepared technique.
@@ -59,60 +59,64 @@ pub trait BenchBackend {
     /// Draws every view once, in order, and measures the frames 0, [`Case::every`], 2 · [`Case::every`], …
     fn measure(&mut self, scene: &BenchScene) -> Result<Errors>;
 
-    /// Ends it: what the validation layers have said, if they were asked.
+    /// Closes the backend and returns the messages of the validation layers, if they are on.
     fn close(self: Box<Self>) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// Cases to run, and how.
+/// A benchmark run: its cases and the way to measure them.
 pub struct Run<'a> {
-    /// Directory for rows, results and pictures.
+    /// Folder for rows, results and pictures.
     pub folder: &'a Path,
-    /// The cases; those of one scene stand in the order in which they take turns.
+    /// The cases. Those of one scene alternate in this order.
     pub cases: Vec<Case>,
     /// The fields of the cases.
     pub fields: Vec<(Terrain, Arc<Field>)>,
-    /// Number of rounds of each case.
+    /// Number of times that each case is timed.
     pub rounds: usize,
-    /// Frames drawn before the path begins, from its first pose.
+    /// Frames drawn at the first pose before each path. They are not counted.
     pub warm_up: usize,
-    /// Set from outside to end the run after the row at hand.
+    /// Set to true, ends the run after the current row.
     pub stop: &'a AtomicBool,
 }
 
 /// Progress of a run.
 pub struct Step<'a> {
-    /// Rows written, and rows of the whole run.
+    /// Rows before the next one, and rows of the whole run.
     pub done: [usize; 2],
-    /// The case that comes next.
+    /// The case that is measured next.
     pub case: &'a Case,
 }
 
 /// Outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// Every row is there.
+    /// All rows are written.
     Complete,
-    /// Stopped early; the same command resumes it.
+    /// Stopped early. The same command resumes the run.
     Stopped,
 }
 
-/// One row to be written.
+/// One row to measure.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     case: &'a Case,
-    /// The round to time, or the errors.
+    /// Number of the round to time; `None` to measure errors.
     round: Option<usize>,
 }
 
 impl Run<'_> {
-    /// Runs what is not there yet and writes the results, also when stopped or when a case fails.
+    /// Measures the rows that the folder lacks, then writes the results. Results are also written if the run is
+    /// stopped or a case fails. `at` is called before each row.
+    ///
+    /// # Errors
+    /// If the folder holds another run, a file cannot be written, or the backend fails.
     pub fn run(&self, backend: &mut dyn BenchBackend, header: Header, at: &mut dyn FnMut(Step)) -> Result<Ended> {
         let mut journal = Journal::open(self.folder, header)?;
         let ended = self.missing_rows(backend, &mut journal, at);
         let written = results::write(self.folder);
-        // The first failure is the one to tell of.
+        // Reports the first failure.
         let ended = ended?;
         written?;
         Ok(ended)
@@ -141,13 +145,14 @@ impl Run<'_> {
         Ok(Ended::Complete)
     }
 
-    /// Rows and results stay valid if a row fails.
+    /// Tells the user, if a row fails, that earlier rows are kept and how to resume.
     fn kept(&self, journal: &Journal) -> String {
         let rows = journal.rows().len();
-        format!("{}: {rows} rows are kept, the same command goes on there", self.folder.display())
+        format!("{}: {rows} rows are kept, the same command resumes the run", self.folder.display())
     }
 
-    /// Scene by scene: the rounds, in each all cases in turn, then the errors.
+    /// Lists all rows in the order of measurement. For each scene: one time row per case in every round, then the
+    /// error rows.
     fn tasks(&self) -> Vec<Task<'_>> {
         let mut scenes: Vec<String> = self.cases.iter().map(Case::scene).collect();
         let mut seen = std::collections::BTreeSet::new();
@@ -160,6 +165,7 @@ impl Run<'_> {
         scenes.iter().flat_map(of_scene).collect()
     }
 
+    /// Measures one row.
     fn row(&self, backend: &mut dyn BenchBackend, flights: &mut Flights, task: Task) -> Result<Row> {
         let case = task.case;
         let (_, field) = self.fields.iter().find(|(terrain, _)| *terrain == case.terrain).context("no such terrain")?;
@@ -180,6 +186,7 @@ impl Run<'_> {
 }
 
 impl Task<'_> {
+    /// Returns true if `row` is the result of this task.
     fn is_done_by(&self, row: &Row) -> bool {
         match row {
             Row::Header(_) => false,
@@ -189,7 +196,7 @@ impl Task<'_> {
     }
 }
 
-/// The path last flown: the cases of a scene differ in nothing but the tolerance.
+/// Caches the poses of one scene's path, which all its cases share.
 #[derive(Default)]
 struct Flights {
     scene: String,
@@ -198,6 +205,7 @@ struct Flights {
 }
 
 impl Flights {
+    /// Returns the views of a case, one per frame.
     fn views(&mut self, case: &Case, field: &Field) -> Result<Vec<View>> {
         if self.scene != case.scene() {
             let path = paths::find(&case.path).with_context(|| format!("no path {}", case.path))?;
@@ -208,20 +216,20 @@ impl Flights {
 }
 
 impl Case {
-    /// The tolerance under its metric.
+    /// Returns the tolerance and its metric.
     pub fn tolerance(&self) -> Tolerance {
         let metric = if self.metric == "paper" { Metric::Paper } else { Metric::Certified };
         Tolerance { px: self.tolerance_px, metric }
     }
 }
 
-/// Milliseconds without what is below a microsecond: rows are text.
+/// Rounds milliseconds to whole microseconds, which keeps the rows short.
 fn whole_us(ms: f64) -> f64 {
     (ms * 1e3).round() / 1e3
 }
 
 impl Times {
-    /// Sums one round's frames up.
+    /// Summarises the frames of one round.
     pub fn of(round: usize, timed: Timed, goal: Option<Goal>) -> Self {
         let frames = &timed.frames;
         let times = |of: fn(&FrameSample) -> f64| Percentiles::of(frames.iter().map(of));

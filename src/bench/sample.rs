@@ -1,32 +1,33 @@
-//! Measurements of one frame.
+//! Times and counts of one frame.
 
-/// Measurements of one frame.
+/// Times and counts of one frame. `None` where the device cannot measure the value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameSample {
-    /// From the start of selection until the picture is done, milliseconds.
+    /// Time from the start of selection until the device has finished, milliseconds.
     pub frame_ms: f64,
-    /// Selection, milliseconds.
+    /// Host time of selecting the level of detail, milliseconds.
     pub select_ms: f64,
-    /// Recording of commands, milliseconds.
+    /// Host time of recording commands, milliseconds.
     pub record_ms: f64,
-    /// The device, milliseconds.
+    /// Device time of all passes, milliseconds.
     pub gpu_ms: Option<f64>,
-    /// Copying to the device, milliseconds.
+    /// Host time of writing the frame's data for the device and recording its uploads, milliseconds.
     pub upload_ms: Option<f64>,
-    /// The same pose with the same fragment work in one full-screen pass, milliseconds.
+    /// Frame time of the shading-only baseline, milliseconds: one full-screen pass that does the same fragment work
+    /// without triangles.
     pub shading_only_ms: Option<f64>,
-    /// Triangles drawn.
+    /// Triangles in the draw list.
     pub triangles: u64,
-    /// Vertices run.
+    /// Vertex shader invocations.
     pub vertices: Option<u64>,
-    /// Draws of the list.
+    /// Draws in the draw list.
     pub draws: u64,
-    /// Draw commands recorded.
+    /// Draw commands recorded: fewer than draws if they are submitted indirectly.
     pub commands: u64,
-    /// Factor by which the tolerance grew because the list did not fit: 1 if it was kept.
+    /// Factor by which the tolerance was scaled so that the list fits its buffers; 1 if it fitted at once.
     pub tolerance_scale: f64,
-    /// Visible instances whose refinement is pending.
+    /// Visible instances that are coarser than the tolerance allows because finer data is not on the device yet.
     pub pending: u64,
-    /// Error allowed, pixels.
+    /// Tolerance of the frame, pixels.
     pub tolerance_px: f64,
 }

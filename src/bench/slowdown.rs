@@ -1,30 +1,30 @@
-//! Ratio of two runs' times, frame by frame.
+//! Ratio of the times of two runs, compared frame by frame.
 //!
-//! What disturbs a frame only ever adds to its time: of a frame's times over the rounds the shortest is nearest to the
-//! truth (Chen, Revels 2016, "Robust benchmarking in noisy environments"). It is held against the other run's shortest
-//! time of the same frame. The median of these ratios over all frames is the result, and its interval that of a
-//! bootstrap over the rounds, which are as independent of each other as anything in a run.
+//! Disturbances only ever lengthen a frame. Of a frame's times in all rounds, the shortest is therefore the best
+//! estimate (J. Chen and J. Revels, "Robust benchmarking in noisy environments", 2016). It is divided by the shortest
+//! time of the same frame in the other run. The result is the median of these ratios over all frames. Its interval
+//! comes from a bootstrap over the rounds.
 
 use super::results::CaseResult;
 use super::rows::Times;
 use super::statistics::{Estimate, middle, percentile, sorted};
 
-/// Draws of the bootstrap.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 1000;
-/// Fewer rounds tell nothing of the noise.
+/// Smallest number of rounds that allows an estimate of the noise.
 pub const MIN_ROUNDS: usize = 3;
 
-/// One case in both runs.
+/// The same case in both runs, the earlier one first.
 pub type Pair<'a> = (&'a CaseResult, &'a CaseResult);
 
-/// A time of a frame.
+/// The time of a frame that is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
-    /// Its time.
-    FrameSample,
-    /// The time of its floor: shading alone, and how fast the machine was.
+    /// Frame time.
+    Frame,
+    /// Frame time of the shading-only baseline.
     ShadingOnly,
-    /// Its time over its floor's.
+    /// Frame time divided by that of the shading-only baseline, which cancels the speed of the machine.
     OverShadingOnly,
 }
 
@@ -35,8 +35,8 @@ pub fn has_shading_only(case: &CaseResult) -> bool {
         .all(|round| !round.frames_ms.is_empty() && round.shading_only_frames_ms.len() == round.frames_ms.len())
 }
 
-/// The cost of the second run over that of the first, all these cases together, and the interval that leaves a share
-/// of `tail` out on either side.
+/// Returns the cost in the second run divided by that in the first, over all frames of all `pairs`. The interval
+/// leaves out the share `tail` of the bootstrap distribution on either side.
 pub fn slowdown(pairs: &[Pair], cost: Cost, tail: f64) -> Estimate {
     let count = |side: fn(&Pair) -> usize| pairs.iter().map(side).max().unwrap_or(0);
     let (a, b) = (count(|pair| pair.0.rounds.len()), count(|pair| pair.1.rounds.len()));
@@ -48,7 +48,7 @@ pub fn slowdown(pairs: &[Pair], cost: Cost, tail: f64) -> Estimate {
     Estimate { value, low: percentile(&resampled, tail), high: percentile(&resampled, 1.0 - tail) }
 }
 
-/// The median over all frames of all cases, looking at these rounds of either run.
+/// Returns the median ratio over all frames of all pairs, from the rounds `a` of the first run and `b` of the second.
 fn median_ratio(pairs: &[Pair], cost: Cost, [a, b]: [&[usize]; 2]) -> f64 {
     middle(pairs.iter().flat_map(|pair| {
         let [before, after] = [costs(pair.0, cost, a), costs(pair.1, cost, b)];
@@ -56,9 +56,10 @@ fn median_ratio(pairs: &[Pair], cost: Cost, [a, b]: [&[usize]; 2]) -> f64 {
     }))
 }
 
+/// Returns the cost of each frame, from these rounds.
 fn costs(case: &CaseResult, cost: Cost, rounds: &[usize]) -> Vec<f64> {
     match cost {
-        Cost::FrameSample => shortest(case, rounds, frames_ms),
+        Cost::Frame => shortest(case, rounds, frames_ms),
         Cost::ShadingOnly => shortest(case, rounds, |round| &round.shading_only_frames_ms),
         Cost::OverShadingOnly => {
             let shading_only = shortest(case, rounds, |round| &round.shading_only_frames_ms);
@@ -71,12 +72,12 @@ fn costs(case: &CaseResult, cost: Cost, rounds: &[usize]) -> Vec<f64> {
     }
 }
 
-/// A round's frames; one for all of them if it has but their median.
+/// Returns the frame times of a round. Rows of older versions have only their median, which then stands for all.
 fn frames_ms(round: &Times) -> &[f64] {
     if round.frames_ms.is_empty() { std::slice::from_ref(&round.frame_ms.p50) } else { &round.frames_ms }
 }
 
-/// The shortest time of each frame in these rounds.
+/// Returns the shortest time of each frame in these rounds. Numbers beyond the last round start over at the first.
 fn shortest(case: &CaseResult, rounds: &[usize], times: fn(&Times) -> &[f64]) -> Vec<f64> {
     let mut of_rounds = rounds.iter().map(|&k| times(&case.rounds[k % case.rounds.len()]));
     let mut shortest = of_rounds.next().unwrap_or_default().to_vec();

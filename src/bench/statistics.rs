@@ -1,53 +1,54 @@
-//! Statistics of noisy times: medians and percentiles by rank, bootstrap intervals of medians. Deterministic.
+//! Statistics of noisy times: medians, percentiles by rank, and bootstrap intervals of medians. Random numbers have a
+//! fixed seed, so equal values give equal results.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::measure::extended;
 
-/// Draws of a bootstrap.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 4000;
-/// Share of the distribution that a quoted interval holds.
+/// Confidence level of intervals.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Values that half, 95 % and 99 % do not exceed, and the largest.
+/// Median, two high percentiles and maximum of some values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Percentiles {
     /// Median.
     pub p50: f64,
-    /// 95 %.
+    /// 95th percentile.
     pub p95: f64,
-    /// 99 %.
+    /// 99th percentile.
     pub p99: f64,
-    /// Largest.
+    /// Largest value.
     pub max: f64,
 }
 
-/// Mean and largest.
+/// Mean and maximum of some values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Spread {
     /// Mean.
     pub mean: f64,
-    /// Largest.
+    /// Largest value.
     pub max: f64,
 }
 
-/// A value and the interval that holds it with a given confidence.
+/// An estimate with its confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Estimate {
-    /// The value.
+    /// The estimate.
     pub value: f64,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Percentiles {
-    /// Of these values; zeros if there is none.
+    /// Computes the percentiles of these values; zeros without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let sorted = sorted(values);
         let at = |share| percentile(&sorted, share);
@@ -56,7 +57,7 @@ impl Percentiles {
 }
 
 impl Spread {
-    /// Of these values; zeros if there is none.
+    /// Computes mean and maximum of these values, which must not be negative; zeros without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let (count, sum, max) =
             values.into_iter().fold((0.0, 0.0, 0.0f64), |(n, sum, max), v| (n + 1.0, sum + v, max.max(v)));
@@ -65,7 +66,7 @@ impl Spread {
 }
 
 impl Estimate {
-    /// The median of these values with its bootstrap 95 % interval (percentile method, Efron 1979).
+    /// Returns the median of these values with its 95 % interval (percentile bootstrap, Efron 1979).
     pub fn median(values: &[f64]) -> Self {
         let mut random = fastrand::Rng::with_seed(1);
         let draws = sorted((0..RESAMPLES).map(|_| median(&resampled(values, &mut random))));
@@ -75,25 +76,25 @@ impl Estimate {
     }
 }
 
-/// In ascending order.
+/// Sorts values in ascending order.
 pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_unstable_by(f64::total_cmp);
     values
 }
 
-/// As many values again, each drawn from all, sorted.
+/// Draws as many values as given, with replacement, and sorts them.
 fn resampled(values: &[f64], random: &mut fastrand::Rng) -> Vec<f64> {
     sorted((0..values.len()).map(|_| values[random.usize(..values.len())]))
 }
 
-/// The smallest of the sorted values that this share of them does not exceed; 0 of none.
+/// Returns a percentile of sorted values by nearest rank. `share` is 0.95 for the 95th one. 0 without values.
 pub fn percentile(sorted: &[f64], share: f64) -> f64 {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
-/// The middle of the sorted values; 0 of none.
+/// Returns the median of sorted values; 0 without values.
 fn median(sorted: &[f64]) -> f64 {
     match sorted.len() {
         0 => 0.0,
@@ -101,7 +102,7 @@ fn median(sorted: &[f64]) -> f64 {
     }
 }
 
-/// The middle value; 0 of none.
+/// Returns the median of values in any order; 0 without values.
 pub fn middle(values: impl IntoIterator<Item = f64>) -> f64 {
     median(&sorted(values))
 }
@@ -120,7 +121,7 @@ mod tests {
         assert_eq!(middle([4.0, 1.0, 3.0, 9.0]), 3.5);
     }
 
-    /// Of 400 samples of 15 values around 10, about 95 % have an interval that holds 10.
+    /// About 95 % of the intervals from 400 samples of 15 values around 10 must contain 10.
     #[test]
     fn intervals_hold_the_truth_as_often_as_they_say() {
         let mut random = fastrand::Rng::with_seed(3);

@@ -1,4 +1,4 @@
-//! `cuesta bench`: error and run time along named paths. `cuesta bench compare`: the differences of two runs.
+//! `cuesta bench`: measures error and run time along named camera paths. `cuesta bench compare`: compares two runs.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -23,10 +23,10 @@ use crate::plan::Look;
 #[derive(Args, Debug)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct BenchArgs {
-    /// Another action than measuring.
+    /// Action on finished benchmarks, instead of measuring.
     #[command(subcommand)]
     pub action: Option<Action>,
-    /// Selection of fields, techniques and paths.
+    /// What to measure.
     #[command(flatten)]
     pub measure: MeasureArgs,
 }
@@ -34,22 +34,23 @@ pub struct BenchArgs {
 /// Actions on finished benchmarks.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// Compare two benchmarks; exit code 1 if anything got worse.
+    /// Compare two benchmark runs; exit code 1 if anything got worse.
     Compare(CompareArgs),
 }
 
 /// Arguments of `cuesta bench compare`.
 #[derive(Args, Debug)]
 pub struct CompareArgs {
-    /// Folder of the benchmark before.
+    /// Folder of the earlier run.
     pub a: PathBuf,
-    /// Folder of the benchmark after.
+    /// Folder of the later run.
     pub b: PathBuf,
-    /// Largest relative difference that counts as noise: 0.1 is 10 %.
+    /// Largest relative change that counts as noise: 0.1 is 10 %.
     #[arg(long, value_name = "SHARE", default_value_t = THRESHOLD)]
     pub threshold: f64,
 }
 
+/// Result of the subcommand.
 #[derive(Serialize)]
 struct Done {
     results: String,
@@ -71,15 +72,15 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
     let share = args.threshold;
     ensure!(share.is_finite() && share >= 0.0, "--threshold {share}: expected 0 or more");
     let comparison = compare(&Results::read(&args.a)?, &Results::read(&args.b)?, share);
-    ensure!(comparison.matched > 0, "{}: has no case of {}", args.b.display(), args.a.display());
+    ensure!(comparison.matched > 0, "{}: no case in common with {}", args.b.display(), args.a.display());
     report::print(common, &comparison)?;
     Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Opens a device to draw the cases that [`Planned`] lists.
+/// Opens the device that the command line names, as a backend of the benchmark.
 #[cfg(feature = "vulkan")]
 fn backend(common: &Common, look: Look) -> Result<Box<dyn BenchBackend>> {
-    let gpu = super::render::open(common, false)?;
+    let gpu = super::render::open(common)?;
     Ok(Box::new(crate::bench::device::DeviceBackend::new(gpu, look, common.techniques.clone())))
 }
 
@@ -93,7 +94,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     let planned = Planned::new(common, args)?;
     let mut backend = backend(common, args.ground.over(Look::default())?)?;
     let header = header(backend.as_mut(), &planned)?;
-    // The first Ctrl-C ends the run after the current row, the second one at once. Finished rows are kept either way.
+    // The first Ctrl-C ends the run after the current row, the second one immediately. Finished rows are kept.
     let stop = interrupt::flag();
     let run = Run {
         folder,
@@ -110,14 +111,14 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
         bar.set_message(step.case.to_string());
     });
     bar.finish_and_clear();
-    // The page shows the finished rows. Its failure must not hide the reason for missing ones.
+    // The report is drawn even if the run failed. The error of the run is reported first.
     let page = crate::report::write(folder);
     let (ended, page) = (ended?, page?);
     let found = Results::read(folder)?;
     let rows = crate::bench::journal::read(folder)?.1.len();
     let complete = ended == Ended::Complete;
     if !complete {
-        report::warn(common, "stopped; the same command goes on where it was");
+        report::warn(common, "stopped; the same command resumes the run");
     }
     let (results, page) = (folder.join(RESULTS).display().to_string(), page.display().to_string());
     let messages = backend.close();
@@ -126,6 +127,7 @@ fn measure(common: &Common, args: &MeasureArgs) -> Result<Outcome> {
     Ok(if is_missed { Outcome::LimitMissed } else { Outcome::Done })
 }
 
+/// Describes the run for its rows.
 fn header(backend: &mut dyn BenchBackend, planned: &Planned) -> Result<Header> {
     let (device, plans) = backend.describe(&planned.fields)?;
     Ok(Header {

@@ -1,4 +1,4 @@
-//! Turns the arguments of `cuesta bench` into fields and cases.
+//! Arguments of `cuesta bench`, and the fields and cases that they select.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,12 +15,12 @@ use crate::bench::{Case, Terrain, kit, paths};
 use crate::height::Field;
 use crate::lod::TechniqueSpec;
 
-/// Frames drawn before a path begins.
+/// Warm-up frames before each path.
 const WARM_UP: usize = 5;
-/// Number of frames of a path that are measured for errors, roughly.
+/// Largest number of frames on a path at which errors are measured.
 const MEASURED: usize = 12;
-/// The technique that draws every sample in every view at any tolerance.
-const TRUTH: &str = "brute-force";
+/// The technique that draws every sample. Its tolerance has no effect, so it is measured at one only.
+const BRUTE_FORCE: &str = "brute-force";
 
 /// Fields, techniques, tolerances and paths of a benchmark.
 #[derive(Args, Debug)]
@@ -31,34 +31,36 @@ pub struct MeasureArgs {
     /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// Folder for rows, results, pictures and the report; a stopped run continues there.
+    /// Folder for rows, results, pictures and the report. A stopped run resumes in its folder.
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
-    /// Techniques, each `technique` or `technique:variant`, by default all; times are relative to the first one.
+    /// Techniques, each `technique` or `technique:variant`; default: all. Times are also given relative to the first
+    /// one.
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub technique: Vec<TechniqueSpec>,
-    /// A setting, for every technique that has it; may be repeated. Each of several values is measured.
+    /// Settings of the techniques that have them; may be repeated. Each combination of the values is measured.
     #[arg(long = "set", value_name = "KEY=V,…", value_parser = key_value)]
     pub settings: Vec<(String, String)>,
-    /// Largest errors on the screen, pixels; each is measured.
+    /// Tolerances: largest allowed errors on the screen, pixels. Each is measured.
     #[arg(long, value_name = "PX,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0, 4.0, 8.0])]
     pub tolerance: Vec<f64>,
-    /// Triangles per frame to hold by moving the tolerance; starts at the first tolerance. Each is measured.
+    /// Adjust the tolerance to keep N triangles per frame, starting from the first --tolerance. Each value is measured.
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub triangles: Vec<f64>,
-    /// Milliseconds per frame to hold by moving the tolerance; each is measured.
+    /// Adjust the tolerance to keep MS milliseconds per frame, starting from the first --tolerance. Each value is
+    /// measured.
     #[arg(long, value_name = "MS,…", value_delimiter = ',')]
     pub frame_time: Vec<f64>,
-    /// Paths to fly; the kit has its own.
+    /// Camera paths; the kit has its own.
     #[arg(long, value_name = "P,…", value_delimiter = ',', default_value = "circle", help = path_help())]
     pub path: Vec<String>,
     /// Formula that converts metres of error to pixels.
     #[arg(long, value_enum, default_value_t = Choice::Certified)]
     pub metric: Choice,
-    /// Size of the picture, pixels; the kit has its own.
+    /// Size of the pictures, pixels; the kit has its own.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Frames per path; the kit has its own.
+    /// Number of frames per path; the kit has its own.
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
     /// Number of times that each case is timed.
@@ -67,23 +69,23 @@ pub struct MeasureArgs {
     /// Ground materials and a moving sun.
     #[command(flatten)]
     pub ground: GroundArgs,
-    /// Run the public benchmark kit, on the terrains given too.
+    /// Run the public benchmark kit. Terrains on the command line are measured along with it.
     #[arg(long)]
     pub kit: bool,
-    /// Run only the scenes of the kit with one of these in their name, as in "peers-1 2049".
+    /// Run only the scenes of the kit whose name contains one of these texts, as in "peers-1 2049".
     #[arg(long, value_name = "TEXT,…", value_delimiter = ',', requires = "kit")]
     pub only: Vec<String>,
-    /// A quarter of the frames and two rounds: a smoke test, not for publication.
+    /// Smoke test: a quarter of the frames, and two rounds. Not for publication.
     #[arg(long)]
     pub quick: bool,
 }
 
-/// The metrics to measure.
+/// The metrics to measure under.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// An upper bound for every pixel.
+    /// An upper bound of the error at every pixel.
     Certified,
-    /// The formula of the paper.
+    /// The formula of the technique's paper: no bound off the view axis.
     Paper,
     /// Both, one after the other.
     Both,
@@ -95,35 +97,37 @@ pub struct Planned {
     pub fields: Vec<(Terrain, Arc<Field>)>,
     /// The cases.
     pub cases: Vec<Case>,
-    /// Number of times that each is timed.
+    /// Number of times that each case is timed.
     pub rounds: usize,
-    /// Frames drawn before a path begins.
+    /// Warm-up frames before each path.
     pub warm_up: usize,
     /// The technique that times are relative to.
     pub base: String,
-    /// Arguments that two parts of one run share; a stopped run continues only under equal ones.
+    /// Arguments that determine the cases, in a fixed order and spelling. A stopped run resumes only if they are equal.
     pub arguments: Vec<String>,
 }
 
-/// Lists the paths for `--help`.
+/// Returns the help of `--path`, which lists all paths.
 pub fn path_help() -> String {
     let paths: Vec<_> = paths::PATHS.iter().map(|path| format!("{} ({})", path.name, path.about)).collect();
-    format!("Paths to fly; the kit has its own: {}", paths.join(", "))
+    format!("Camera paths; the kit has its own: {}", paths.join(", "))
 }
 
 /// A requested technique with its settings.
 #[derive(Clone)]
-struct Asked {
+struct Requested {
     technique: String,
     settings: BTreeMap<String, String>,
 }
 
-/// A path over a field.
+/// A path over a field, which every technique is measured on.
 struct Flight {
     terrain: Terrain,
     path: &'static str,
+    /// Size of the pictures (x, y), pixels.
     size: [u32; 2],
     frames: usize,
+    /// Errors are measured at frames 0, `every`, 2 · `every`, …
     every: usize,
 }
 
@@ -133,7 +137,7 @@ impl Planned {
     /// # Errors
     /// If an argument is wrong or a file cannot be read.
     pub fn new(common: &Common, args: &MeasureArgs) -> Result<Self> {
-        let asked = techniques(common, args)?;
+        let requested = techniques(common, args)?;
         let numbers = [
             ("--tolerance", "pixels", &args.tolerance),
             ("--triangles", "triangles", &args.triangles),
@@ -152,16 +156,17 @@ impl Planned {
         if args.quick {
             flights.iter_mut().for_each(Flight::shorten);
         }
-        let cases = flights.iter().flat_map(|flight| cases(flight, &asked, args)).collect();
+        let cases = flights.iter().flat_map(|flight| cases(flight, &requested, args)).collect();
         let rounds = if args.quick { 2 } else { args.rounds as usize };
         let warm_up = if args.kit && !args.quick { kit::WARM_UP } else { WARM_UP };
         let arguments = arguments(args);
-        Ok(Self { fields, cases, rounds, warm_up, base: asked[0].technique.clone(), arguments })
+        Ok(Self { fields, cases, rounds, warm_up, base: requested[0].technique.clone(), arguments })
     }
 }
 
-/// Checks the requested techniques; all of the table if none is named.
-fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
+/// Returns the requested techniques with their settings. Without `--technique` these are all techniques, without
+/// variants.
+fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Requested>> {
     let mut specs = args.technique.clone();
     if specs.is_empty() {
         specs = common.techniques.specs().into_iter().filter(|spec| spec.variant.is_none()).collect();
@@ -170,11 +175,11 @@ fn techniques(common: &Common, args: &MeasureArgs) -> Result<Vec<Asked>> {
         let has = |spec| common.techniques.entry(spec).is_ok_and(|entry| entry.settings.iter().any(|s| s.key == key));
         ensure!(specs.iter().any(has), "--set {key}: no technique of this run has this setting");
     }
-    Ok(specs.iter().map(|spec| asked(common, spec, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
+    Ok(specs.iter().map(|spec| combinations(common, spec, &args.settings)).collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// Returns a technique once for each combination of the values of its settings.
-fn asked(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) -> Result<Vec<Asked>> {
+fn combinations(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) -> Result<Vec<Requested>> {
     let entry = technique::entry(&common.techniques, spec)?;
     let mut all = vec![Vec::new()];
     for (key, values) in choices.iter().filter(|(key, _)| entry.settings.iter().any(|setting| setting.key == key)) {
@@ -184,11 +189,12 @@ fn asked(common: &Common, spec: &TechniqueSpec, choices: &[(String, String)]) ->
     let checked = |own: Vec<(String, String)>| {
         let settings = technique::settings(entry, spec.variant.as_deref(), &own)?;
         report::warn_of_idle(common, entry, &settings);
-        Ok(Asked { technique: spec.to_string(), settings: own.into_iter().collect() })
+        Ok(Requested { technique: spec.to_string(), settings: own.into_iter().collect() })
     };
     all.into_iter().map(checked).collect()
 }
 
+/// Adds the fields and flights of the kit, or those whose name contains one of the texts `only`.
 fn of_kit(
     common: &Common,
     only: &[String],
@@ -199,7 +205,7 @@ fn of_kit(
     for scene in kit::SCENES.iter().filter(is_wanted) {
         let terrain = scene.terrain();
         if fields.iter().all(|(other, _)| *other != terrain) {
-            let _spinner = report::spinner(common, format!("making {terrain}"));
+            let _spinner = report::spinner(common, format!("synthesising {terrain}"));
             fields.push((terrain.clone(), scene.field()));
         }
         let kit::KitScene { path, frames, every, .. } = *scene;
@@ -207,11 +213,12 @@ fn of_kit(
     }
     if flights.is_empty() {
         let names: Vec<_> = kit::SCENES.iter().map(kit::KitScene::name).collect();
-        bail!("--only {}: the kit has no such scene, expected a part of: {}", only.join(","), names.join("; "));
+        bail!("--only {}: no scene of the kit matches, expected part of one of: {}", only.join(","), names.join("; "));
     }
     Ok(())
 }
 
+/// Adds the fields of height files, and a flight along each path over each of them.
 fn of_files(
     common: &Common,
     args: &MeasureArgs,
@@ -228,7 +235,7 @@ fn of_files(
         if let Some((other, _)) =
             fields.iter().find(|(other, _)| other.name == terrain.name && other.size == terrain.size)
         {
-            bail!("{file}: there are two terrains {other}");
+            bail!("{file}: another terrain has the same name and size: {other}");
         }
         for name in &paths {
             let Some(path) = paths::find(name) else {
@@ -246,15 +253,16 @@ fn of_files(
 }
 
 impl Flight {
-    /// Keeps a quarter of the frames, and measures about three of them.
+    /// Reduces the frames to a quarter, with errors measured at no more than three of them.
     fn shorten(&mut self) {
         self.frames = self.frames.div_ceil(4);
         self.every = self.frames.div_ceil(3);
     }
 }
 
-/// Returns the cases of a flight. The technique that draws every sample has one case.
-fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
+/// Returns the cases of a flight: every technique at every tolerance or goal under every metric. Brute force has one
+/// case, as neither has an effect on it.
+fn cases(flight: &Flight, requested: &[Requested], args: &MeasureArgs) -> Vec<Case> {
     let metrics: &[&str] = match args.metric {
         Choice::Certified => &["certified"],
         Choice::Paper => &["paper"],
@@ -262,20 +270,21 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     };
     let goals = goals(args);
     let mut cases = Vec::new();
-    for (metric, asked) in metrics.iter().flat_map(|metric| asked.iter().map(move |asked| (metric, asked))) {
-        let is_truth = asked.technique == TRUTH;
-        // A held goal starts from the first tolerance.
-        let is_one = is_truth || !goals.is_empty();
-        let tolerances = if is_one { &args.tolerance[..1] } else { &args.tolerance[..] };
-        let goals: Vec<_> = if is_one && !is_truth { goals.iter().copied().map(Some).collect() } else { vec![None] };
-        if is_truth && *metric != metrics[0] {
+    for (metric, own) in metrics.iter().flat_map(|metric| requested.iter().map(move |own| (metric, own))) {
+        let is_brute_force = own.technique == BRUTE_FORCE;
+        if is_brute_force && *metric != metrics[0] {
             continue;
         }
+        // With goals, the first tolerance is that of the first frame.
+        let has_one = is_brute_force || !goals.is_empty();
+        let tolerances = if has_one { &args.tolerance[..1] } else { &args.tolerance[..] };
+        let has_goals = has_one && !is_brute_force;
+        let goals: Vec<_> = if has_goals { goals.iter().copied().map(Some).collect() } else { vec![None] };
         let choices = tolerances.iter().flat_map(|&px| goals.iter().map(move |&goal| (px, goal)));
         cases.extend(choices.map(|(tolerance_px, goal)| Case {
             terrain: flight.terrain.clone(),
-            technique: asked.technique.clone(),
-            settings: asked.settings.clone(),
+            technique: own.technique.clone(),
+            settings: own.settings.clone(),
             tolerance_px,
             goal,
             metric: metric.to_string(),
@@ -288,13 +297,13 @@ fn cases(flight: &Flight, asked: &[Asked], args: &MeasureArgs) -> Vec<Case> {
     cases
 }
 
-/// Returns the budgets to hold.
+/// Returns the goals of `--triangles` and `--frame-time`.
 fn goals(args: &MeasureArgs) -> Vec<Goal> {
     let triangles = args.triangles.iter().map(|&count| Goal::Triangles(count));
     triangles.chain(args.frame_time.iter().map(|&ms| Goal::FrameMs(ms))).collect()
 }
 
-/// Describes the choices of a run, independent of their order and spelling.
+/// Returns the arguments that determine the cases, independent of their order and spelling on the command line.
 fn arguments(args: &MeasureArgs) -> Vec<String> {
     let joined = |values: &[String]| values.join(",");
     let specs: Vec<_> = args.technique.iter().map(TechniqueSpec::to_string).collect();

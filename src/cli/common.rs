@@ -1,13 +1,13 @@
-//! Flags of every subcommand, and the outcome of a run.
+//! Flags that every subcommand has, and the outcome of a subcommand.
 
 use clap::Args;
 
 use crate::lod::Techniques;
 
-/// Flags of every subcommand, and the techniques that `--technique` chooses from.
+/// Flags that every subcommand has, and the techniques that `--technique` chooses from.
 #[derive(Args, Debug, Clone, Default)]
 pub struct Common {
-    /// Print one JSON document on stdout and nothing else there.
+    /// Print the result as one JSON document on stdout.
     #[arg(long, global = true)]
     pub json: bool,
     /// Print no progress and no warnings.
@@ -16,7 +16,7 @@ pub struct Common {
     /// Vulkan device: part of its name, or `cpu` for a software device.
     #[arg(long, global = true, value_name = "NAME")]
     pub device: Option<String>,
-    /// Turn validation layers on; any message makes the exit code 1.
+    /// Turn Vulkan's validation layers on. Any message makes the exit code 1.
     #[arg(long, global = true)]
     pub validate: bool,
     /// For tests: fail every allocation of device memory after the first N.
@@ -30,11 +30,11 @@ pub struct Common {
     pub techniques: Techniques,
 }
 
-/// Outcome of a run that did not fail.
+/// Outcome of a subcommand that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything was done: exit code 0.
+    /// Finished: exit code 0.
     Done,
-    /// A limit was missed (a crack, an error, a validation message), or the run was stopped: exit code 1.
+    /// Finished with a missed limit (a crack, too large an error, a validation message), or stopped early: exit code 1.
     LimitMissed,
 }

@@ -1,4 +1,4 @@
-//! The procedural terrain named `endless`, without stored samples.
+//! The procedural terrain `endless`, which has no stored samples.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,21 +14,24 @@ pub fn named(terrain: &str, options: &Options) -> Option<Result<Loaded>> {
     let seed = match rest.strip_prefix(':') {
         None if rest.is_empty() => Ok(1),
         None => return None,
-        Some(seed) => seed.parse().map_err(|_| anyhow!("{terrain}: seed: expected a number of 0 or more")),
+        Some(seed) => seed.parse().map_err(|_| anyhow!("{terrain}: seed: expected a whole number from 0 on")),
     };
     Some(seed.and_then(|seed| endless(terrain, seed, options)))
 }
 
-/// Returns true for the name of such a terrain.
+/// Returns true if [`named`] finds a terrain of this name, even one with a wrong seed.
 pub fn is_named(terrain: &str) -> bool {
     named(terrain, &Options::default()).is_some()
 }
 
-/// Makes the terrain. Options about samples do not apply to it and are refused.
+/// Makes the terrain.
+///
+/// # Errors
+/// If an option about samples is given, such as a spacing or a crop.
 fn endless(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     let Options { max_samples, hole_fill, .. } = *options;
     if *options != (Options { max_samples, hole_fill, ..Options::default() }) {
-        bail!("{terrain}: it is worked out as it is looked at: it has no samples to space, scale, crop or repeat");
+        bail!("{terrain}: procedural terrain has no samples to space, scale, crop or repeat");
     }
     let field = Field::endless(Arc::new(Bezier::new(seed, LAYERS)));
     let sample_type = "f32".to_string();
@@ -43,10 +46,13 @@ fn endless(terrain: &str, seed: u64, options: &Options) -> Result<Loaded> {
     })
 }
 
-/// Refuses a terrain without samples.
+/// Checks that a terrain has samples. `what` is the command or flag that reads all of them.
+///
+/// # Errors
+/// If the terrain is procedural.
 pub fn need_samples(field: &Field, what: &str) -> Result<()> {
     if field.procedural().is_some() {
-        bail!("{what}: it looks at every sample, and this land has none");
+        bail!("{what}: reads every sample, but procedural terrain has none");
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `cuesta export`: writes the drawn mesh of one view, in world metres.
+//! `cuesta export`: writes the mesh that a technique draws in one view, in world metres.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -44,9 +44,11 @@ struct Exported {
     vertices: usize,
 }
 
-/// Vertices in world metres, and triangles of them.
+/// An indexed mesh.
 struct Mesh {
+    /// World positions, metres.
     positions: Vec<DVec3>,
+    /// Indices of the corners.
     triangles: Vec<[u32; 3]>,
 }
 
@@ -79,10 +81,12 @@ pub fn run(common: &Common, args: &ExportArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Collects triangles and shares their vertices.
+/// Collects triangles into a mesh and merges equal vertices.
 struct MeshBuilder<'a> {
     field: &'a Field,
+    /// Binary digits of a fraction of a sample in the corners' positions.
     fraction_bits: u32,
+    /// Index of each vertex by lattice position (x, z) and the bits of its height.
     known: HashMap<(i32, i32, u32), u32>,
     mesh: Mesh,
 }
@@ -102,6 +106,7 @@ impl<'a> MeshBuilder<'a> {
         self.mesh.triangles.push(triangle);
     }
 
+    /// Returns the index of a corner's vertex, which is added if it is new.
     fn vertex(&mut self, corner: &Corner) -> u32 {
         let positions = &mut self.mesh.positions;
         *self.known.entry((corner.x, corner.z, corner.y.to_bits())).or_insert_with(|| {
@@ -111,6 +116,7 @@ impl<'a> MeshBuilder<'a> {
     }
 }
 
+/// Writes binary PLY with f64 positions.
 fn write_ply(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment x east, y up, z south; world metres")?;
     writeln!(out, "element vertex {}", mesh.positions.len())?;
@@ -131,6 +137,7 @@ fn write_ply(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     Ok(())
 }
 
+/// Writes Wavefront OBJ, whose indices start at 1.
 fn write_obj(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     writeln!(out, "# x east, y up, z south; world metres")?;
     for p in &mesh.positions {
@@ -142,7 +149,10 @@ fn write_obj(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes glTF. Its positions are f32, relative to a node whose translation is f64.
+/// Writes binary glTF 2.0. Positions are f32, relative to the translation of their node, which JSON stores as f64.
+///
+/// # Errors
+/// If the file exceeds 4 GiB, the format's limit, or writing fails.
 fn write_glb(mesh: &Mesh, out: &mut Out) -> io::Result<()> {
     let low = mesh.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
     let high = mesh.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `cuesta info`: describes height files, the scene plan, and the devices.
+//! `cuesta info`: describes a terrain, the scene plan, a view's texture tiles, or the Vulkan devices.
 
 use std::sync::Arc;
 
@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::common::{Common, Outcome};
 pub use super::info_args::InfoArgs;
 use super::{plan, report, working_set};
-use crate::height::{Loaded, SourceFile};
+use crate::height::{Extent, Loaded, SourceFile};
 
-/// Description of a field.
+/// Description of a terrain.
 #[derive(Serialize)]
 pub struct Info {
     format: String,
@@ -19,21 +19,23 @@ pub struct Info {
     spacing_m: [f64; 2],
     origin: [f64; 2],
     crs: Option<String>,
+    /// Rectangle of longitudes and latitudes around the samples, if the coordinate system can be transformed.
+    extent_deg: Option<Extent>,
     min_m: f32,
     max_m: f32,
     mean_m: f64,
     hole_count: u64,
     sample_type: String,
     exact_in_16_bit: bool,
-    /// Largest difference between the two ways to split a cell, metres.
+    /// Largest difference, at the centre of a cell, between the two ways to split the cell into triangles, metres.
     cell_ambiguity_m: f32,
-    /// The files with the heights; a later one overlies an earlier one.
+    /// The files that the heights come from. Where they overlap, the last one counts.
     sources: Vec<SourceFile>,
     warnings: Vec<String>,
 }
 
 impl Info {
-    /// Describes a field.
+    /// Describes a terrain that was read.
     pub fn of(loaded: &Loaded) -> Self {
         let field = &loaded.field;
         let [width, height] = field.size();
@@ -45,6 +47,7 @@ impl Info {
             spacing_m: field.spacing,
             origin: field.origin,
             crs: field.crs.clone(),
+            extent_deg: loaded.footprint.place.as_ref().and_then(|place| place.extent(field.stored())),
             min_m: statistics.min,
             max_m: statistics.max,
             mean_m: statistics.mean,
@@ -64,7 +67,7 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
         return devices(common);
     }
     if args.terrain.is_empty() {
-        bail!("info: expected a terrain or --devices");
+        bail!("info: expected a terrain, or --devices");
     }
     let loaded = args.reading.load(common, &args.terrain)?;
     if let Some(path) = &args.working_set {
@@ -83,9 +86,10 @@ pub fn run(common: &Common, args: &InfoArgs) -> Result<Outcome> {
 
 #[cfg(not(feature = "vulkan"))]
 fn devices(_: &Common) -> Result<Outcome> {
-    bail!("--devices: this build is without Vulkan");
+    bail!("--devices: built without Vulkan");
 }
 
+/// Lists the Vulkan devices and the required features that each lacks.
 #[cfg(feature = "vulkan")]
 fn devices(common: &Common) -> Result<Outcome> {
     use crate::gpu::{Instance, device};

@@ -16,25 +16,26 @@ pub struct InfoArgs {
     /// Options for reading them.
     #[command(flatten)]
     pub reading: ReadArgs,
-    /// List the features that this scene needs on the device, and those that it leaves out.
+    /// Print the scene plan: the features that this scene needs on the device, and those that it leaves out.
     #[arg(long, requires = "terrain")]
     pub plan: bool,
-    /// Measure each feature that is left out: each is kept once, for FRAMES frames of the view.
+    /// Measure the cost of each feature that is left out, by drawing FRAMES frames of the view with it.
     #[arg(long, value_name = "FRAMES", requires = "plan", num_args = 0..=1, default_missing_value = "30")]
     pub measure: Option<usize>,
-    /// Draw the nodes of a map of 2^36 texels over the field that the view needs, by level, as a .png.
+    /// Write a .png that shows which tiles of a virtual texture with 2^36 texels over the field the view needs, by
+    /// level.
     #[arg(long, value_name = "FILE", requires = "terrain", conflicts_with = "plan")]
     pub working_set: Option<PathBuf>,
-    /// The view for the plan and the working set.
+    /// The view for `--measure` and `--working-set`.
     #[command(flatten)]
     pub view: ViewArgs,
-    /// List Vulkan devices, and the features that each lacks.
+    /// List the Vulkan devices, and the required features that each lacks.
     #[arg(long)]
     pub devices: bool,
-    /// The technique of the plan.
+    /// The technique for the plan and the working set.
     #[command(flatten)]
     pub technique: TechniqueArgs,
-    /// The look of the plan.
+    /// The look for the plan.
     #[command(flatten)]
     pub look: LookArgs,
 }

@@ -1,5 +1,7 @@
-//! Ctrl-C. The first one asks the current work to stop at a good place, if it can. Otherwise, or the second time, the
-//! program ends at once. Unfinished files have temporary names and are removed.
+//! Handling of Ctrl-C.
+//!
+//! The first Ctrl-C requests a clean stop if the current work supports it. Otherwise, and at the second Ctrl-C, the
+//! program ends immediately. Incomplete files have temporary names and are removed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -9,26 +11,26 @@ use signal_hook::low_level::exit;
 use super::report::note;
 use crate::height::save::discard_unfinished;
 
-/// A request to the current work to stop.
-pub type Ask = Box<dyn FnOnce() + Send>;
+/// A function that requests the current work to stop.
+pub type StopRequest = Box<dyn FnOnce() + Send>;
 
-static ASK: Mutex<Option<Ask>> = Mutex::new(None);
+/// The function that the next Ctrl-C calls; `None` to end the program.
+static NEXT: Mutex<Option<StopRequest>> = Mutex::new(None);
 
-/// Installs the handler of Ctrl-C.
+/// Installs the handler of Ctrl-C. Does nothing if the process already has one.
 pub fn install() {
-    // Fails if the process has another handler, which then stays.
     let _ = ctrlc::set_handler(|| {
-        let ask = ASK.lock().unwrap_or_else(|e| e.into_inner()).take();
-        ask.map_or_else(end, |ask| ask());
+        let next = NEXT.lock().unwrap_or_else(|e| e.into_inner()).take();
+        next.map_or_else(end, |request| request());
     });
 }
 
-/// Replaces the effect of the next Ctrl-C.
-pub fn once(ask: Ask) {
-    *ASK.lock().unwrap_or_else(|e| e.into_inner()) = Some(ask);
+/// Makes the next Ctrl-C call a function instead of ending the program.
+pub fn once(request: StopRequest) {
+    *NEXT.lock().unwrap_or_else(|e| e.into_inner()) = Some(request);
 }
 
-/// Returns a flag that the next Ctrl-C sets.
+/// Returns a flag that the next Ctrl-C sets to true, instead of ending the program.
 pub fn flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = Arc::clone(&flag);
@@ -36,9 +38,10 @@ pub fn flag() -> Arc<AtomicBool> {
     flag
 }
 
-/// Ends the process without destructors: other threads are still at work.
+/// Removes incomplete files and ends the program with exit code 2. Destructors do not run, as other threads are still
+/// working.
 fn end() {
     discard_unfinished();
-    note("error: stopped by Ctrl-C: what was not whole is not written");
+    note("error: stopped by Ctrl-C; incomplete files were removed");
     exit(2);
 }

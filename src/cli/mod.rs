@@ -1,4 +1,4 @@
-//! The program: one file per subcommand. Command names and JSON fields are stable, for scripts.
+//! The command-line program, with one file per subcommand. Names of commands, flags and JSON fields are stable.
 
 pub mod bench;
 pub mod cases;
@@ -38,7 +38,7 @@ pub use common::{Common, Outcome};
 
 use crate::lod::Techniques;
 
-/// Draws large terrain with a bounded error.
+/// Draw large terrain with a bounded error.
 #[derive(Parser, Debug)]
 #[command(name = "cuesta", version, about, args_override_self = true)]
 pub struct Cli {
@@ -53,34 +53,34 @@ pub struct Cli {
 /// The subcommands.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Describe a height file, list devices, or explain the scene plan.
+    /// Describe height files, the scene plan, or the Vulkan devices.
     Info(info::InfoArgs),
     /// Draw one picture.
     #[cfg(feature = "vulkan")]
     Render(render::RenderArgs),
-    /// Measure each draw of a frame: tables and a trace.
+    /// Measure the time of each draw of a frame.
     #[cfg(feature = "vulkan")]
     Profile(profile::ProfileArgs),
-    /// Write the mesh of one view as PLY, OBJ or GLB.
+    /// Write the mesh drawn in one view as PLY, OBJ or GLB.
     Export(export::ExportArgs),
-    /// Open a window.
+    /// Show the terrain in a window.
     #[cfg(feature = "viewer")]
     View(view::ViewerArgs),
-    /// Measure error and run time of every technique at every tolerance along named paths.
+    /// Measure error and run time of techniques along camera paths.
     Bench(bench::BenchArgs),
-    /// Run the stress suite: every technique on stiff and extreme cases.
+    /// Run the stress suite: check every technique on stiff and extreme cases.
     Stress(stress::StressArgs),
-    /// Draw the report of a benchmark again from its rows.
+    /// Draw the report of a benchmark or of the stress suite again.
     Report(redraw::ReportArgs),
-    /// Make a synthetic field.
+    /// Write a synthetic field to a file.
     Synth(synth::SynthArgs),
 }
 
 impl Cli {
-    /// Parses a command line, the program's name first, with the built-in techniques.
+    /// Parses a command line with the built-in techniques. The first word is the program's name.
     ///
     /// # Errors
-    /// If the command line is wrong, or asks for help or the version.
+    /// If the command line is wrong. Help and version are also returned as errors.
     pub fn parse_words(words: impl IntoIterator<Item: Into<OsString> + Clone>) -> Result<Self, clap::Error> {
         Self::parse_with(words, &Techniques::built_in())
     }
@@ -97,10 +97,10 @@ impl Cli {
     }
 }
 
-/// Runs the program `cuesta` on the process's command line, with these techniques. Returns its exit code.
+/// Runs the program `cuesta` with the process's command line and these techniques. Returns the exit code: 0 if it
+/// finished, 1 if a limit was missed, 2 for wrong use or a failure, which prints one line on stderr.
 ///
-/// 0: done. 1: a limit was missed. 2: wrong use or a failure, with one line on stderr. Replaces the panic hook and
-/// handles Ctrl-C.
+/// Replaces the panic hook, and handles Ctrl-C.
 pub fn main(techniques: &Techniques) -> ExitCode {
     panic::set_hook(Box::new(fault));
     interrupt::install();
@@ -123,7 +123,7 @@ pub fn main(techniques: &Techniques) -> ExitCode {
     }
 }
 
-/// Returns the error of a command line in one line.
+/// Formats clap's error in one line, without its hints.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines: Vec<_> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
@@ -131,11 +131,11 @@ pub fn one_line(error: &clap::Error) -> String {
     line.strip_prefix("error: ").map_or(line.clone(), str::to_string)
 }
 
-/// Prints a panic in one line: source position and message.
+/// Prints a panic in one line on stderr: source position and message.
 fn fault(info: &PanicHookInfo) {
     let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
-    let said = info.payload_as_str().unwrap_or("no words").replace('\n', " ");
-    report::note(format_args!("error: a fault of cuesta's own at {place}: {said}"));
+    let message = info.payload_as_str().unwrap_or("no message").replace('\n', " ");
+    report::note(format_args!("error: internal error at {place}: {message}"));
 }
 
 fn run(cli: Cli) -> Result<Outcome> {
@@ -157,30 +157,32 @@ fn run(cli: Cli) -> Result<Outcome> {
     }
 }
 
+/// Opens a window with the demo terrain, or draws a picture of it if there is no display.
 #[cfg(feature = "vulkan")]
 fn without_subcommand(common: &Common) -> Result<Outcome> {
     #[cfg(feature = "viewer")]
     if view::has_display() {
         return run_words(common, &["view", "demo"]);
     }
-    report::note("no display: rendering cuesta.png instead");
+    report::note("no display: drawing cuesta.png instead");
     run_words(common, &["render", "demo", "-o", "cuesta.png"])
 }
 
-/// Runs a subcommand under the flags that were given.
+/// Runs a subcommand with the common flags of the actual command line.
 #[cfg(feature = "vulkan")]
 fn run_words(common: &Common, words: &[&str]) -> Result<Outcome> {
     let cli = Cli::parse_words(std::iter::once(&"cuesta").chain(words))?;
     run(Cli { common: common.clone(), ..cli })
 }
 
+/// Prints the help.
 #[cfg(not(feature = "vulkan"))]
 fn without_subcommand(_: &Common) -> Result<Outcome> {
     report::say(command().render_help())?;
     Ok(Outcome::Done)
 }
 
-/// Returns clap's description of the command line. Tests compare documents with it.
+/// Returns clap's description of the command line.
 pub fn command() -> clap::Command {
     numbers::with_negative(Cli::command())
 }

@@ -1,4 +1,5 @@
-//! `cuesta info --plan`: the features that a scene needs on the device, those that it leaves out, and the savings.
+//! `cuesta info --plan`: lists the features that a scene needs on the device and those that it leaves out.
+//! `--measure` adds the measured cost of the latter.
 
 use std::sync::Arc;
 
@@ -14,57 +15,67 @@ use crate::height::{Field, Loaded};
 use crate::lod::Technique;
 use crate::plan::{Decision, Look, ScenePlan};
 
-/// Features that are kept and left out, and data that the technique did not prepare.
+/// The scene plan, and facts about the prepared technique.
 #[derive(Serialize)]
 struct Plan {
     technique: &'static str,
     kept: Vec<Decision>,
     left_out: Vec<LeftOut>,
-    /// Data that the technique did not prepare for this field.
+    /// Data that the technique does not need for this field.
     omitted: Vec<Unprepared>,
     stats: Vec<Figure>,
-    /// Measurement with all features kept.
+    /// Measured cost of the scene as planned.
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole>,
 }
 
+/// A feature that the scene leaves out.
 #[derive(Serialize)]
 struct LeftOut {
     feature: &'static str,
     reason: String,
-    /// Device bytes, measured where `measured` exists.
+    /// Device memory saved, bytes: measured if `measured` is present, otherwise calculated.
     bytes_saved: i64,
     #[serde(flatten)]
     measured: Option<Saved>,
 }
 
+/// Data that a technique does not prepare because the field does not need it.
 #[derive(Serialize)]
 struct Unprepared {
     what: &'static str,
     reason: String,
+    /// Memory saved, bytes.
     bytes_saved: u64,
 }
 
-/// Measured cost of a feature beside its bytes.
+/// Measured cost of a feature that the scene leaves out.
 #[derive(Serialize)]
 struct Saved {
     pipelines_saved: i64,
+    /// Shader instructions saved, all shaders together.
     instructions_saved: i64,
-    /// Device time for a frame with the feature, relative to that without.
+    /// Device time of a frame with the feature, divided by that without it.
     time_with: f64,
-    /// Number of pixels that differ with it, and the largest difference, of 255.
+    /// Number of pixels that change with the feature.
     pixels_changed: usize,
+    /// Largest change of a colour channel, of 255.
     largest_change: u8,
 }
 
+/// Measured cost of a scene.
 #[derive(Serialize)]
 struct Whole {
+    /// Device memory, bytes.
     bytes: i64,
     pipelines: i64,
+    /// Shader instructions, all shaders together.
     instructions: i64,
+    /// Median device time of a frame, milliseconds.
     gpu_ms: f64,
 }
 
+/// A statistic of the technique with its unit.
 #[derive(Serialize)]
 struct Figure {
     name: &'static str,
@@ -72,7 +83,7 @@ struct Figure {
     unit: &'static str,
 }
 
-/// Runs the subcommand for a field that was read.
+/// Runs `info --plan` for a terrain that was read. `terrain` is its name on the command line.
 pub fn run(common: &Common, args: &InfoArgs, terrain: &str, loaded: Loaded) -> Result<Outcome> {
     let field = &Arc::new(loaded.field);
     let (look, overlay) = args.look.build(common, terrain, (field, &loaded.footprint))?;
@@ -100,12 +111,13 @@ impl From<Decision> for LeftOut {
     }
 }
 
-/// Field, look, and the overlay.
+/// Field, look, and overlay.
 type Scenery<'a> = (&'a Arc<Field>, &'a Look, Option<&'a image::RgbaImage>);
 
-/// Measurement with all features kept, and the cost of each feature that is left out.
+/// The cost of the scene as planned; for each feature that is left out its name, device bytes, and other costs.
 type Measured = (Whole, Vec<(&'static str, i64, Saved)>);
 
+/// Plans the scene for the device that the command line names. Measures it if `--measure` is given.
 #[cfg(feature = "vulkan")]
 fn plan(
     common: &Common,
@@ -115,7 +127,7 @@ fn plan(
 ) -> Result<(ScenePlan, Option<Measured>)> {
     use crate::scene::{self, Scene, savings};
 
-    let gpu = super::render::open(common, false)?;
+    let gpu = super::render::open(common)?;
     let plan = scene::plan(&gpu, field, look, overlay, technique.pipeline_requirements())?;
     let Some(frames) = args.measure else {
         return Ok((plan, None));
@@ -135,7 +147,7 @@ fn plan(
     Ok((plan, Some((whole, savings.into_iter().map(saved).collect()))))
 }
 
-/// Without Vulkan, a plan assumes the limits of a common desktop device.
+/// Plans the scene for the limits of a common desktop device, as this build has no Vulkan.
 #[cfg(not(feature = "vulkan"))]
 fn plan(
     _: &Common,
@@ -146,7 +158,7 @@ fn plan(
     use crate::plan::DeviceLimits;
 
     if args.measure.is_some() {
-        bail!("--measure: this build is without Vulkan");
+        bail!("--measure: built without Vulkan");
     }
     let device = DeviceLimits { image_side: 16384, image_layers: 2048, filters_heights: true };
     let picture = overlay.map(|picture| picture.dimensions().into());

@@ -1,4 +1,4 @@
-//! `cuesta profile`: the time of each draw of a frame, and the modes of submission side by side.
+//! `cuesta profile`: measures the time of each draw of a frame, and compares submission modes.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,10 +30,10 @@ pub struct ProfileArgs {
     /// Folder for trace.json, profile.json, passes.csv, draws.csv and modes.csv.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Frames per median.
+    /// Number of frames to measure.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
-    /// Capture a frame of the slowest mode, if RenderDoc is loaded.
+    /// Capture a frame of the slowest submission mode, if RenderDoc is loaded.
     #[arg(long)]
     pub renderdoc: bool,
     /// The view.
@@ -68,7 +68,7 @@ struct Document {
     validation_messages: Vec<String>,
 }
 
-/// A capture by RenderDoc.
+/// A RenderDoc capture of one frame.
 #[derive(Serialize)]
 struct Capture {
     mode: String,
@@ -83,7 +83,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     let (look, overlay) = args.look.build(common, &args.terrain.name(), (&field, &footprint))?;
     let view = args.view.build(&field, args.technique.tolerance()?)?;
     let forms = forms(common, args, &field)?;
-    let gpu = open(common, false)?;
+    let gpu = open(common)?;
     let plan = scene::plan(&gpu, &field, &look, overlay.as_ref(), PipelineRequirements::default())?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     files::make_folder(&args.out)?;
@@ -119,7 +119,7 @@ pub fn run(common: &Common, args: &ProfileArgs) -> Result<Outcome> {
     Ok(if document.validation_messages.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Returns the requested form of the technique, and then its other variants under the same settings.
+/// Returns the requested variant of the technique, followed by its other variants with the same settings.
 fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<Form>> {
     let (entry, chosen) = args.technique.settings(&common.techniques)?;
     report::warn_of_idle(common, entry, &chosen);
@@ -136,6 +136,7 @@ fn forms(common: &Common, args: &ProfileArgs, field: &Arc<Field>) -> Result<Vec<
     variants.into_iter().map(form).collect()
 }
 
+/// Captures a frame of the slowest mode. Warns if RenderDoc is not loaded.
 fn capture(common: &Common, measured: &mut Measured) -> Result<Option<Capture>> {
     let Some(renderdoc) = RenderDoc::loaded() else {
         report::warn(common, "--renderdoc: no capture: RenderDoc's library is not loaded in this process");
@@ -145,6 +146,7 @@ fn capture(common: &Common, measured: &mut Measured) -> Result<Option<Capture>> 
     Ok(Some(Capture { mode, file }))
 }
 
+/// Prints the results as text.
 fn say(document: &Document) -> Result<()> {
     report::say(table::text(&document.profile).trim_end())?;
     report::say(format_args!("trace: {} (open it in https://ui.perfetto.dev)", document.trace.display()))?;

@@ -1,4 +1,4 @@
-//! `cuesta report`: draws the report of a benchmark or of the stress suite again from its rows.
+//! `cuesta report`: draws the report of a benchmark or of the stress suite again, from its rows.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `cuesta render`: draws one picture; `--measure` adds the error of the triangles that were drawn.
+//! `cuesta render`: draws one picture. `--measure` measures its error and proves the surface watertight.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -42,13 +42,13 @@ pub struct RenderArgs {
     /// The look.
     #[command(flatten)]
     pub look: LookArgs,
-    /// Time of the scene for a moving sun, seconds.
+    /// Scene time, seconds; moves the sun with `--sun-speed`.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub time: f64,
-    /// Draw N times and report the median times.
+    /// Draw N times and print the median times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeat: u32,
-    /// Measure the error, prove the surface watertight, and count hole and skirt pixels.
+    /// Measure the error, prove the surface watertight, and count pixels that show holes or skirts.
     #[arg(long)]
     pub measure: bool,
 }
@@ -66,15 +66,16 @@ struct Rendered {
     commands: usize,
     batches: usize,
     levels: Vec<usize>,
-    /// Factor on the tolerance where the list would have exceeded its limits; 1 where the tolerance was kept.
+    /// Factor by which the tolerance was scaled so that the list fits its buffers; 1 if it fitted at once.
     #[serde(serialize_with = "extended::serialize")]
     tolerance_scale: f64,
+    /// Time to prepare the technique, milliseconds.
     prepare_ms: f64,
     select_ms: f64,
     record_ms: f64,
     gpu_ms: f64,
     device_bytes: u64,
-    /// Tiles of an overlay that exceeds the texture memory.
+    /// Tile cache of an overlay that exceeds the texture memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     texture_maps: Option<virtual_overlay::VirtualTextureStats>,
     validation_messages: Vec<String>,
@@ -82,33 +83,38 @@ struct Rendered {
     measured: Option<Measured>,
 }
 
+/// Results of `--measure`.
 #[derive(Serialize)]
 struct Measured {
+    /// Screen error of the samples in view, pixels.
     error_px: Summary,
+    /// Vertical error of the samples in view, metres.
     error_m: Summary,
+    /// Number of pixels where the sky shows through terrain.
     hole_pixels: usize,
-    /// The first few, from the top left corner.
+    /// Positions (x, y) of the first eight, from the top left corner.
     hole_pixels_at: Vec<[usize; 2]>,
+    /// Number of pixels that show a skirt.
     skirt_pixels: usize,
-    /// Triangles of skirts, beside those of the surface.
+    /// Number of triangles of skirts, which `triangles` does not count.
     skirt_triangles: usize,
     watertight: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     counter_example: Option<String>,
 }
 
-/// Opens the device that the command line names.
+/// Opens the Vulkan device that `--device` names, or the best one, for drawing without a window.
 ///
 /// # Errors
-/// If there is none, or Vulkan fails.
-pub fn open(common: &Common, window: bool) -> Result<Arc<Gpu>> {
-    let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), window)?;
+/// If there is no such device, or Vulkan fails.
+pub fn open(common: &Common) -> Result<Arc<Gpu>> {
+    let gpu = Gpu::new(&Instance::new(&[], common.validate)?, &choice(common), false)?;
     gpu.limit_allocations(common.allocations.unwrap_or(u64::MAX));
     gpu.lose_after(common.lose_device.unwrap_or(u64::MAX));
     Ok(gpu)
 }
 
-/// Returns the choice of device on the command line.
+/// Returns the device that `--device` names.
 pub fn choice(common: &Common) -> Choice {
     match common.device.as_deref() {
         None => Choice::Best,
@@ -135,7 +141,7 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     let prepared = Instant::now();
     let mut technique = args.technique.build(common, &field)?;
     let prepare_ms = ms(prepared);
-    let gpu = open(common, false)?;
+    let gpu = open(common)?;
     let plan = scene::plan(&gpu, &field, &look, overlay.as_ref(), technique.pipeline_requirements())?;
     let scene = Scene { gpu: &gpu, field: &field, plan: &plan, look: &look, overlay: overlay.as_ref() };
     let rendered = scene.render(technique.as_mut(), &view, args.repeat)?;
@@ -176,10 +182,12 @@ pub fn run(common: &Common, args: &RenderArgs) -> Result<Outcome> {
     Ok(if missed || !messages.is_empty() { Outcome::LimitMissed } else { Outcome::Done })
 }
 
+/// Returns the time since an instant, milliseconds.
 fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
+/// Measures the triangles and the picture that were drawn.
 fn measure(scene: &Scene, technique: &dyn Technique, view: &View, rendered: &RenderResult) -> Result<Measured> {
     let errors = geometric::errors(scene.field, view, technique.resident(), &rendered.list);
     let proof = watertight::prove_list(

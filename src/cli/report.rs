@@ -1,5 +1,5 @@
-//! Output of the subcommands: JSON or lines on stdout, progress and warnings on stderr. A closed pipe (`| head`) is no
-//! error: the work goes on.
+//! Output of the subcommands: results as JSON or text on stdout, progress and warnings on stderr. A closed pipe, as in
+//! `cuesta … | head`, is not an error.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Write};
@@ -29,12 +29,15 @@ pub fn say(line: impl fmt::Display) -> Result<()> {
     }
 }
 
-/// Prints a line on stderr; ignores a failure to write.
+/// Prints a line on stderr. Failures to write are ignored.
 pub fn note(line: impl fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "{line}");
 }
 
-/// Prints a result as one JSON document, or one line per field.
+/// Prints a result: as one JSON document with `--json`, otherwise one line per field, or nothing with `--quiet`.
+///
+/// # Errors
+/// If stdout cannot be written.
 pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
     let mut value = serde_json::to_value(result)?;
     if common.json {
@@ -48,6 +51,7 @@ pub fn print(common: &Common, result: &impl Serialize) -> Result<()> {
     Ok(())
 }
 
+/// Prints a field on one line. A list of objects gets one line per object.
 fn print_field(name: &str, value: &Value) -> Result<()> {
     match value {
         Value::Array(rows) if rows.iter().any(Value::is_object) => {
@@ -58,6 +62,7 @@ fn print_field(name: &str, value: &Value) -> Result<()> {
     }
 }
 
+/// Formats a value as text on one line.
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -70,28 +75,29 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// Prints a warning on stderr.
+/// Prints a warning on stderr, unless `--quiet` is given.
 pub fn warn(common: &Common, text: &str) {
     if !common.quiet {
         note(format_args!("warning: {text}"));
     }
 }
 
-/// Warns if the tolerance of a list was scaled.
+/// Warns if the tolerance was scaled because the draw list did not fit its buffers. `scale` is the factor.
 pub fn warn_of_tolerance(common: &Common, scale: f64) {
     if scale == f64::INFINITY {
-        warn(common, "there is too much to draw in this view: no tolerance is kept (larger blocks or tiles hold more)");
+        warn(common, "the view exceeds the draw buffers: no tolerance is kept (larger blocks or tiles may fit)");
     } else if scale > 1.0 {
-        warn(common, &format!("there is too much to draw in this view: the tolerance is {scale:.3} times as wide"));
+        warn(common, &format!("the view exceeds the draw buffers: the tolerance was multiplied by {scale:.3}"));
     }
 }
 
-/// Warns of settings without effect.
+/// Warns of settings that have no effect in combination with the others.
 pub fn warn_of_idle(common: &Common, entry: &Entry, settings: &Settings) {
     settings.idle(entry).iter().for_each(|idle| warn(common, &format!("--set {idle}")));
 }
 
-/// Shows a spinner for a technique, with its progress once it is known.
+/// Shows a spinner on a terminal while a technique is prepared, with the share done once that is known. Dropping it
+/// removes it.
 pub fn preparing(common: &Common, what: &str, progress: &Progress) -> ProgressBar {
     let bar = spinner(common, format!("preparing {what}"));
     let progress = progress.clone();
@@ -104,7 +110,7 @@ pub fn preparing(common: &Common, what: &str, progress: &Progress) -> ProgressBa
     bar
 }
 
-/// Shows a spinner on a terminal until it is dropped.
+/// Shows a spinner on a terminal, unless `--quiet` is given. Dropping it removes it.
 pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
     let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
     bar.set_message(what.into());
@@ -112,7 +118,10 @@ pub fn spinner(common: &Common, what: impl Into<String>) -> ProgressBar {
     bar
 }
 
-/// Writes the colours of a picture. Keeps an existing file if writing fails.
+/// Writes a picture as PNG without its alpha channel. If that fails, an existing file is unchanged.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn save(path: &Path, picture: &image::RgbaImage) -> Result<()> {
     let rgb = image::DynamicImage::from(picture.clone()).into_rgb8();
     let written = replace(path, |out| rgb.write_to(out, image::ImageFormat::Png).map_err(std::io::Error::other));

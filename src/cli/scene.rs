@@ -1,4 +1,4 @@
-//! Arguments for terrain, view, technique and look, and the values built from them.
+//! Arguments that describe a scene (terrain, view and look), and the values built from them.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub struct TerrainArgs {
 /// Options for reading heights.
 #[derive(Args, Debug, Clone)]
 pub struct ReadArgs {
-    /// Distance of neighbouring samples, metres; overrides the file.
+    /// Distance between samples, metres; overrides the file.
     #[arg(long, value_name = "DX[,DZ]", value_parser = spacing)]
     pub spacing: Option<[f64; 2]>,
     /// Factor on every height.
@@ -49,17 +49,17 @@ pub struct ReadArgs {
     /// Read the file as bare samples: WxH:u16le|u16be|i16le|i16be|f32le|f32be.
     #[arg(long, value_name = "LAYOUT")]
     pub raw: Option<RawLayout>,
-    /// A ceiling over the field; both together are a cave. Where the ceiling is not above the floor there is rock. Needs
-    /// sorted-strips.
+    /// Heights of a cave's ceiling; the terrain is its floor. Where the ceiling is not above the floor there is rock.
+    /// Requires sorted-strips.
     #[arg(long, value_name = "FILE")]
     pub ceiling: Option<String>,
-    /// Part to keep, samples.
+    /// Keep only W by H samples, from sample (X, Z) on.
     #[arg(long, value_name = "X,Z,W,H", value_parser = numbers::<u32, 4>)]
     pub crop: Option<[u32; 4]>,
-    /// Repeat the field.
+    /// Repeat the field NX times along x and NZ times along z.
     #[arg(long, value_name = "NX,NZ", value_parser = numbers::<u32, 2>)]
     pub tile: Option<[u32; 2]>,
-    /// Treatment of samples without data: no (they stay holes) or interpolate.
+    /// Samples without data: no (they stay holes) or interpolate (they are filled).
     #[arg(long, value_name = "HOW", default_value = "no", value_parser = hole_fill)]
     pub hole_fill: HoleFill,
     /// Encoding of heights in a colour picture: terrarium or mapbox.
@@ -68,13 +68,13 @@ pub struct ReadArgs {
     /// Band to read, from 1.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub band: Option<u32>,
-    /// Zoom level of a folder of tiles.
+    /// Zoom level to read from a folder of web-map tiles; default: the highest one without missing tiles.
     #[arg(long)]
     pub zoom: Option<u32>,
-    /// Refuse files with more samples.
+    /// Largest number of samples; larger terrain is refused.
     #[arg(long, value_name = "N", default_value_t = 1 << 30)]
     pub max_samples: u64,
-    /// Keep no cache beside a large file.
+    /// Neither read nor write cache files beside large height files.
     #[arg(long)]
     pub no_cache: bool,
 }
@@ -82,10 +82,10 @@ pub struct ReadArgs {
 /// Eye and projection.
 #[derive(Args, Debug, Clone)]
 pub struct ViewArgs {
-    /// Position of the eye, world metres; Y may be +H, height above ground.
+    /// Position of the eye, world metres; Y may be +H, a height above ground.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub eye: Option<String>,
-    /// Point to look at, world metres.
+    /// Point to look at, world metres; Y may be +H, a height above ground.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch"])]
     pub look: Option<String>,
     /// Heading, degrees: 0 = east, 90 = south.
@@ -103,10 +103,11 @@ pub struct ViewArgs {
     /// Size of the picture, pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: [u32; 2],
-    /// Near plane, metres; default: 1/1000 of the height above ground, at least 0.1 m (less on terrain below 20 m across).
+    /// Near plane, metres; default: 1/1000 of the height above ground, at least 0.1 m (less on terrain below 20 m
+    /// across).
     #[arg(long, value_name = "M")]
     pub near: Option<f64>,
-    /// Orthographic projection, with a picture this many metres wide.
+    /// Orthographic projection; the picture is M metres wide.
     #[arg(long, value_name = "M")]
     pub ortho: Option<f64>,
 }
@@ -117,11 +118,12 @@ pub struct LookArgs {
     /// Colour of the terrain; default: `overlay` if a picture is given, else `height`.
     #[arg(long, value_enum)]
     pub colour: Option<Colour>,
-    /// Picture laid over the field, placed by its GeoTIFF tags or world file; without them, over all samples of the file.
+    /// Picture to drape over the terrain, placed by its GeoTIFF tags or world file. Without these it covers the whole
+    /// height file.
     #[arg(long, value_name = "IMG")]
     pub overlay: Option<String>,
-    /// Device memory for the overlay or for `--colour ground`, megabytes. A larger texture is streamed in tiles, finer near
-    /// the eye.
+    /// Device memory for the overlay or for `--colour ground`, megabytes. Larger textures are streamed in tiles, finer
+    /// near the eye.
     #[arg(long, value_name = "MB", default_value_t = 1100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
@@ -144,26 +146,26 @@ pub struct GroundArgs {
     /// Show grass, rock, scree and snow near the eye, by slope and height.
     #[arg(long)]
     pub detail: bool,
-    /// Speed of the sun's azimuth, degrees per second: of the window's time, of a path at 60 frames per second, or of
-    /// `--time` for a picture.
+    /// Change of the sun's azimuth, degrees per second of scene time: real time in a window, 1/60 s per frame on a
+    /// path, `--time` in a picture.
     #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.0)]
     pub sun_speed: f64,
-    /// Keep features that the scene does not need; `info --plan` lists them.
+    /// Keep these features even if the scene does not need them; `info --plan` lists them.
     #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
     pub keep: Vec<String>,
-    /// Leave features out.
+    /// Leave these features out even if the scene has them.
     #[arg(long, value_name = "FEATURE,…", value_delimiter = ',')]
     pub leave_out: Vec<String>,
 }
 
 impl GroundArgs {
-    /// Returns a look with these options.
+    /// Returns a look with these options set.
     ///
     /// # Errors
-    /// If a feature is unknown or the speed is not finite.
+    /// If a feature is unknown or cannot be forced, or the speed is not finite.
     pub fn over(&self, look: Look) -> Result<Look> {
         if !self.sun_speed.is_finite() {
-            bail!("--sun-speed {}: expected degrees a second", self.sun_speed);
+            bail!("--sun-speed {}: expected degrees per second", self.sun_speed);
         }
         let named =
             |names: &[String], keep: bool, forced| names.iter().try_fold(forced, |f: Forced, n| f.with(n, keep));
@@ -183,11 +185,13 @@ impl ValueEnum for Colour {
     }
 }
 
+/// Parses a size, `WxH`, of positive numbers.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let pair = numbers::<u32, 2>(&text.replace('x', ","));
     pair.ok().filter(|s| s.iter().all(|&n| n > 0)).ok_or_else(|| "expected WxH, as in 1280x720".to_string())
 }
 
+/// Parses `KEY=VALUE`.
 pub(super) fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     Ok((key.trim().to_string(), value.trim().to_string()))
@@ -210,10 +214,10 @@ fn encoding(text: &str) -> Result<Encoding, String> {
 }
 
 impl ReadArgs {
-    /// Reads a field and its ceiling, if there is one, and prints the reader's warnings.
+    /// Reads a field, and its ceiling if one is given. Prints the reader's warnings.
     ///
     /// # Errors
-    /// If a file cannot be read.
+    /// If a file cannot be read, or floor and ceiling do not match.
     pub fn load(&self, common: &Common, terrain: &[String]) -> Result<Loaded> {
         let mut loaded = self.load_alone(common, terrain)?;
         if let Some(file) = &self.ceiling {
@@ -223,6 +227,7 @@ impl ReadArgs {
         Ok(loaded)
     }
 
+    /// Reads a field without its ceiling.
     fn load_alone(&self, common: &Common, terrain: &[String]) -> Result<Loaded> {
         let options = Options {
             spacing: self.spacing,
@@ -250,9 +255,7 @@ impl ReadArgs {
             load_all(&terrain.iter().map(Path::new).collect::<Vec<_>>(), &options)?
         };
         loaded.field.file = (!self.no_cache && !is_demo).then(|| several::cache_path(terrain).into());
-        for warning in &loaded.warnings {
-            report::warn(common, warning);
-        }
+        warn_of(common, &terrain.join(" "), &loaded);
         Ok(loaded)
     }
 }
@@ -266,13 +269,23 @@ impl TerrainArgs {
         self.reading.load(common, &self.terrain)
     }
 
-    /// Returns all names, as on the command line.
+    /// Returns the names on the command line, separated by spaces.
     pub fn name(&self) -> String {
         self.terrain.join(" ")
     }
 }
 
-/// Returns the spacing and the scale of the embedded picture; the user's options take precedence.
+/// Prints the reader's warnings. Those about a single file get its name, unless they begin with that of the terrain.
+fn warn_of(common: &Common, terrain: &str, loaded: &Loaded) {
+    for warning in &loaded.warnings {
+        match &loaded.sources[..] {
+            [only] if !warning.starts_with(terrain) => report::warn(common, &format!("{}: {warning}", only.file)),
+            _ => report::warn(common, warning),
+        }
+    }
+}
+
+/// Adds the spacing and the height scale of the embedded terrain to the user's options.
 fn demo_options(options: Options) -> Options {
     Options {
         spacing: options.spacing.or(Some([demo::SPACING; 2])),
@@ -288,7 +301,7 @@ impl LookArgs {
         1_000_000 * self.texture_memory
     }
 
-    /// Returns the look of a field that was read from `terrain`, and its overlay.
+    /// Returns the look, and the overlay if the colours need one. `terrain` is the field's name on the command line.
     ///
     /// # Errors
     /// If an option is wrong or the overlay cannot be read.
@@ -301,7 +314,7 @@ impl LookArgs {
         let has_picture = self.overlay.is_some() || is_demo(terrain);
         let colour = self.colour.unwrap_or(if has_picture { Colour::Overlay } else { Colour::Height });
         if colour == Colour::Error && endless::is_named(terrain) {
-            bail!("--colour error: {terrain} has no samples to be compared with");
+            bail!("--colour error: {terrain} has no samples to compare with");
         }
         let picture = self.picture(terrain, colour)?;
         let defaults = Look::default();
@@ -315,7 +328,8 @@ impl LookArgs {
         Ok((self.ground.over(look)?, picture.map(|picture| picture.image)))
     }
 
-    /// Returns the look and the overlay for a window, where the user may switch to the overlay later.
+    /// Returns the look and the overlay for a window, where the user may switch to the overlay later. The overlay is
+    /// read even if the initial colours do not need it.
     ///
     /// # Errors
     /// As [`Self::build`].
@@ -334,7 +348,7 @@ impl LookArgs {
         Ok((Look { drape, ..look }, picture))
     }
 
-    /// Returns the overlay that the colours need.
+    /// Returns the overlay; `None` if the colours need none.
     fn picture(&self, terrain: &str, colour: Colour) -> Result<Option<Picture>> {
         match (&self.overlay, colour) {
             (Some(path), Colour::Overlay | Colour::Maps) => Ok(Some(Picture::read(path)?)),
@@ -346,7 +360,7 @@ impl LookArgs {
 }
 
 impl ViewArgs {
-    /// Returns the view of a field; by default a three-quarter view of all of it.
+    /// Returns the view of a field. By default, it shows the whole field at an angle from above.
     ///
     /// # Errors
     /// If a number is out of range.
@@ -381,17 +395,17 @@ impl ViewArgs {
     }
 }
 
-/// Parses a position `X,Y,Z`, where Y may be `+H`, a height above the ground.
+/// Parses a position `X,Y,Z` in metres. Y may be `+H`, a height above the ground at (X, Z). `flag` is named in errors.
 fn position(flag: &str, text: &str, field: &Field) -> Result<DVec3> {
     let parts: Vec<_> = text.split(',').map(str::trim).collect();
-    let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, 1e12 at most, Y possibly +H above ground");
+    let wrong = || anyhow!("{flag} {text}: expected X,Y,Z in metres, at most 1e12; Y may be +H above ground");
     let &[x, y, z] = parts.as_slice() else { return Err(wrong()) };
     let number = |part: &str| part.parse::<f64>().ok().filter(|v| v.abs() <= FARTHEST_M).ok_or_else(wrong);
     let (x, z) = (number(x)?, number(z)?);
     let y = match y.strip_prefix('+') {
         Some(above) => {
             let ground = field.height_at(x, z);
-            ground.with_context(|| format!("{flag} {text}: there is no land below"))? + number(above)?
+            ground.with_context(|| format!("{flag} {text}: there is no terrain below"))? + number(above)?
         }
         None => number(y)?,
     };

@@ -13,7 +13,7 @@ use crate::stress::{
     self, Case, CaseRun, Finding, ImageChecker, Kind, Row, SCHEMA, Stress, jitter, rows, saved, stiff,
 };
 
-/// Default folder for counter-examples.
+/// Folder for counter-examples without `--out`.
 const FOLDER: &str = "cuesta-stress";
 
 /// Arguments of `cuesta stress`.
@@ -22,19 +22,20 @@ pub struct StressArgs {
     /// Run only this family: data, position, view, time, arithmetic, stiff, file or sweep; may be repeated.
     #[arg(long, value_name = "F")]
     pub family: Vec<String>,
-    /// Run only cases with this in their name; may be repeated.
+    /// Run only cases whose name contains this text; may be repeated.
     #[arg(long, value_name = "NAME")]
     pub case: Vec<String>,
     /// Run only this technique, or technique:variant; may be repeated.
     #[arg(long, value_name = "T")]
     pub technique: Vec<String>,
-    /// Folder for stress.json, index.html and pictures; without it, counter-examples go to cuesta-stress.
+    /// Folder for stress.json, index.html and pictures. Without it, only counter-examples are written, to
+    /// cuesta-stress.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Use no device.
+    /// Skip all checks that need a Vulkan device.
     #[arg(long)]
     pub no_device: bool,
-    /// List the cases.
+    /// List the cases and exit.
     #[arg(long)]
     pub list: bool,
 }
@@ -79,7 +80,7 @@ pub fn run(common: &Common, args: &StressArgs) -> Result<Outcome> {
     Ok(if failed == 0 && stress.ended.is_none() { Outcome::Done } else { Outcome::LimitMissed })
 }
 
-/// Returns the selected cases.
+/// Returns the cases that `--family` and `--case` select.
 fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
     let families: Vec<_> = stress::FAMILIES.iter().filter_map(|cases| Some(cases.first()?.family)).collect();
     if let Some(unknown) = args.family.iter().find(|family| !families.contains(&family.as_str())) {
@@ -91,11 +92,12 @@ fn chosen(args: &StressArgs) -> Result<Vec<&'static Case>> {
     };
     let cases: Vec<_> = stress::cases().filter(is_wanted).collect();
     if cases.is_empty() {
-        bail!("--case {}: no such case, see cuesta stress --list", args.case.join(", "));
+        bail!("--case {}: no case matches, see cuesta stress --list", args.case.join(", "));
     }
     Ok(cases)
 }
 
+/// Makes a progress bar over all runs; those that are also drawn count twice.
 fn progress(common: &Common, trials: &[CaseRun], draws: bool) -> ProgressBar {
     let drawn = trials.iter().filter(|trial| draws && trial.is_drawn()).count();
     let bar = if common.quiet || common.json { ProgressBar::hidden() } else { ProgressBar::no_length() };
@@ -103,6 +105,7 @@ fn progress(common: &Common, trials: &[CaseRun], draws: bool) -> ProgressBar {
     bar
 }
 
+/// Makes the row of a finding, and writes its counter-example to `folder` if it failed.
 fn row(
     common: &Common,
     folder: &Path,
@@ -130,6 +133,7 @@ fn row(
     }
 }
 
+/// Writes the counter-example of a failed finding. Returns its files; none if the finding passed.
 fn counter_example(
     folder: &Path,
     trial: &CaseRun,
@@ -143,6 +147,7 @@ fn counter_example(
     saved::counter_example(folder, trial, finding, checker)
 }
 
+/// Makes the row for the messages of the validation layers.
 fn validation(messages: &[String]) -> Row {
     Row {
         family: "arithmetic".to_string(),
@@ -158,7 +163,7 @@ fn validation(messages: &[String]) -> Row {
     }
 }
 
-/// Writes the rows, the jitter maps and the page.
+/// Writes the rows, the pictures of measurements and the page.
 fn keep(folder: &Path, stress: &mut Stress) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     if stress.cases.iter().any(|row| row.name.starts_with("jitter")) {
@@ -173,6 +178,7 @@ fn keep(folder: &Path, stress: &mut Stress) -> Result<()> {
     Ok(())
 }
 
+/// Prints the results: as JSON, or one line per row and their sum. `--quiet` prints only failures and the sum.
 fn say(common: &Common, stress: &Stress) -> Result<()> {
     if let Some(why) = &stress.ended {
         report::warn(common, why);
@@ -188,6 +194,7 @@ fn say(common: &Common, stress: &Stress) -> Result<()> {
     report::say(format_args!("{passed} checks passed, {failed} failed"))
 }
 
+/// Formats a row on one line.
 fn line(row: &Row) -> String {
     let number = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.6}"));
     let number = |value| {
@@ -204,17 +211,18 @@ fn line(row: &Row) -> String {
     format!("{verdict}  {family}: {name}, {technique}: {check}: {} of {}{why}", number(*value), number(*limit))
 }
 
-/// The device, if one is present and not switched off.
+/// Name and image checker of the Vulkan device; `None` if there is none or `--no-device` is given.
 #[cfg(feature = "vulkan")]
 struct Device(Option<(String, stress::device::DeviceImageChecker)>);
 
 #[cfg(feature = "vulkan")]
 impl Device {
+    /// Opens the device. A missing one is an error only if the command line names a device or asks for validation.
     fn open(common: &Common, args: &StressArgs) -> Result<Self> {
         if args.no_device {
             return Ok(Self(None));
         }
-        match super::render::open(common, false) {
+        match super::render::open(common) {
             Ok(gpu) => {
                 let name = gpu.candidate.name.clone();
                 Ok(Self(Some((name, stress::device::DeviceImageChecker::new(gpu)))))
@@ -237,7 +245,7 @@ impl Device {
     }
 }
 
-/// The place of the device in a build without Vulkan.
+/// Stands in for the device in a build without Vulkan.
 #[cfg(not(feature = "vulkan"))]
 struct Device;
 

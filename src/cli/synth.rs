@@ -28,6 +28,7 @@ pub struct SynthArgs {
     pub output: PathBuf,
 }
 
+/// Returns the help of the kind, which lists all kinds.
 fn kinds() -> String {
     let names: Vec<_> = synth::KINDS.iter().map(|kind| format!("{} ({})", kind.name, kind.about)).collect();
     format!("Kind of field: {}", names.join(", "))

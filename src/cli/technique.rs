@@ -1,4 +1,4 @@
-//! The technique on the command line: its name, its settings, and the tolerance that it keeps.
+//! Arguments for the technique, its settings and the tolerance.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::height::Field;
 use crate::lod::{Entry, Settings, Technique, TechniqueSpec, Techniques};
 use crate::view::{Metric, Tolerance};
 
-/// The technique and the tolerance.
+/// Technique, settings and tolerance.
 #[derive(Args, Debug, Clone)]
 pub struct TechniqueArgs {
     /// Technique, or technique:variant.
@@ -22,7 +22,7 @@ pub struct TechniqueArgs {
     /// A setting of the technique; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub settings: Vec<(String, String)>,
-    /// Largest error on the screen, pixels.
+    /// Tolerance: largest allowed error on the screen, pixels.
     #[arg(long, value_name = "PX", default_value_t = 1.0)]
     pub tolerance: f64,
     /// Formula that converts metres of error to pixels.
@@ -30,17 +30,17 @@ pub struct TechniqueArgs {
     pub metric: MetricArg,
 }
 
-/// [`Metric`] as a word.
+/// [`Metric`] on the command line.
 #[derive(ValueEnum, Clone, Copy, Debug)]
 pub enum MetricArg {
-    /// An upper bound for every pixel.
+    /// An upper bound of the error at every pixel.
     Certified,
-    /// The formula of the paper: no bound off the view axis.
+    /// The formula of the technique's paper: no bound off the view axis.
     Paper,
 }
 
 impl MetricArg {
-    /// Returns the word.
+    /// Returns the name on the command line and in results.
     pub fn name(self) -> &'static str {
         match self {
             MetricArg::Certified => "certified",
@@ -49,7 +49,7 @@ impl MetricArg {
     }
 }
 
-/// Lists the techniques in the help of each subcommand that draws one.
+/// Lists all techniques in the help of `--technique`, in each subcommand that takes one technique.
 pub(super) fn with_names(command: Command, techniques: &Techniques) -> Command {
     let specs: Vec<_> = techniques.specs().iter().map(TechniqueSpec::to_string).collect();
     let help = format!("Technique, or technique:variant: {}", specs.join(", "));
@@ -64,15 +64,15 @@ pub(super) fn with_names(command: Command, techniques: &Techniques) -> Command {
 /// Returns the technique that `--technique` names.
 ///
 /// # Errors
-/// If there is none of this name.
+/// If there is no such technique. The error names the flag.
 pub(super) fn entry(techniques: &Techniques, spec: &TechniqueSpec) -> Result<&'static Entry> {
     techniques.entry(spec).map_err(|why| anyhow!("--technique {why}"))
 }
 
-/// Returns the settings of a technique.
+/// Checks the settings of a technique.
 ///
 /// # Errors
-/// If a variant, a key or a value is unknown. The error names the flag at fault.
+/// If a variant, key or value is unknown. The error names the flag at fault.
 pub(super) fn settings(entry: &Entry, variant: Option<&str>, choices: &[(String, String)]) -> Result<Settings> {
     Settings::new(entry, variant, choices).map_err(|what| {
         let is_variant = variant.is_some_and(|name| entry.variants.iter().all(|variant| variant.name != name));
@@ -81,19 +81,19 @@ pub(super) fn settings(entry: &Entry, variant: Option<&str>, choices: &[(String,
 }
 
 impl TechniqueArgs {
-    /// Returns the row of the table and the settings for it.
+    /// Returns the technique's table row and its checked settings.
     ///
     /// # Errors
-    /// If a name or a value is unknown.
+    /// If a name or value is unknown.
     pub fn settings(&self, techniques: &Techniques) -> Result<(&'static Entry, Settings)> {
         let entry = entry(techniques, &self.technique)?;
         Ok((entry, settings(entry, self.technique.variant.as_deref(), &self.settings)?))
     }
 
-    /// Prepares the technique for a field, and warns of settings without effect.
+    /// Prepares the technique for a field. Warns of settings without effect and shows the progress.
     ///
     /// # Errors
-    /// If a name or a value is unknown, or the technique cannot draw the field.
+    /// If a name or value is unknown, or the technique cannot draw the field.
     pub fn build(&self, common: &Common, field: &Arc<Field>) -> Result<Box<dyn Technique>> {
         let (entry, settings) = self.settings(&common.techniques)?;
         report::warn_of_idle(common, entry, &settings);
@@ -101,10 +101,10 @@ impl TechniqueArgs {
         entry.prepare(field, &settings).map_err(Error::msg)
     }
 
-    /// Returns the tolerance.
+    /// Returns the tolerance and its metric.
     ///
     /// # Errors
-    /// If it is not finite or too small.
+    /// If the tolerance is not finite or is below 1e-9 px.
     pub fn tolerance(&self) -> Result<Tolerance> {
         if !(self.tolerance.is_finite() && self.tolerance >= FINEST) {
             bail!("--tolerance {:?}: expected at least {FINEST:e} pixels", self.tolerance);

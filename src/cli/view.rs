@@ -1,4 +1,4 @@
-//! `cuesta view`: opens a window.
+//! `cuesta view`: shows a terrain in a window.
 
 use std::sync::Arc;
 
@@ -21,30 +21,30 @@ pub struct ViewerArgs {
     /// The height data.
     #[command(flatten)]
     pub terrain: TerrainArgs,
-    /// The view at the start.
+    /// The initial view.
     #[command(flatten)]
     pub view: ViewArgs,
-    /// The technique at the start.
+    /// The initial technique.
     #[command(flatten)]
     pub technique: TechniqueArgs,
-    /// The look at the start.
+    /// The initial look.
     #[command(flatten)]
     pub look: LookArgs,
-    /// Wait for the display before each frame.
+    /// Wait for the display's refresh before each frame.
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub vsync: Switch,
-    /// Hold this number of triangles per frame by moving the tolerance.
+    /// Adjust the tolerance to keep N triangles per frame.
     #[arg(long, value_name = "N", conflicts_with = "frame_time")]
     pub triangles: Option<f64>,
-    /// Hold this many milliseconds per frame by moving the tolerance, without waiting for the display.
+    /// Adjust the tolerance to keep MS milliseconds per frame; turns vsync off.
     #[arg(long, value_name = "MS")]
     pub frame_time: Option<f64>,
-    /// Close the window after this many seconds.
+    /// Close the window after S seconds.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
 }
 
-/// On or off.
+/// Value of a flag that is on or off.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Switch {
     /// On.
@@ -62,13 +62,14 @@ struct Viewed {
     validation_messages: Vec<String>,
 }
 
-/// Returns true if a window can be opened.
+/// Returns true unless the environment shows that there is no display: on Unix other than macOS, `DISPLAY` or
+/// `WAYLAND_DISPLAY` must be set.
 pub fn has_display() -> bool {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !cfg!(all(unix, not(target_os = "macos"))) || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
 }
 
-/// Returns the budget of a frame.
+/// Returns the target of `--triangles` or `--frame-time`.
 fn target(args: &ViewerArgs) -> Result<Option<Target>> {
     let target = args.triangles.map(Target::Triangles).or(args.frame_time.map(Target::FrameMs));
     if let Some(cost) = target.map(|target| target.cost()).filter(|cost| !(cost.is_finite() && *cost > 0.0)) {
@@ -92,6 +93,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
     let Loaded { field, footprint, .. } = args.terrain.load(common)?;
     let field = Arc::new(field);
     let (look, overlay) = args.look.build_for_window(common, &args.terrain.name(), (&field, &footprint))?;
+    let spinner = report::preparing(common, technique.0.name, &technique.1.progress);
     let summary = viewer::run(&Setup {
         name: args.terrain.name(),
         view: args.view.build(&field, args.technique.tolerance()?)?,
@@ -107,6 +109,7 @@ pub fn run(common: &Common, args: &ViewerArgs) -> Result<Outcome> {
         target,
         vsync: args.vsync == Switch::On && args.frame_time.is_none(),
         seconds: args.seconds,
+        on_prepared: Box::new(move || spinner.finish_and_clear()),
         save: report::save,
         on_interrupt: interrupt::once,
     })?;

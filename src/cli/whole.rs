@@ -1,24 +1,25 @@
-//! The default view: all of a field.
+//! The default view, which shows the whole field.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::height::Field;
 use crate::view::{Lens, Metric, Tolerance, View};
 
-/// The extent of a field, and an eye that sees all of it.
+/// Extent of a field, and an eye that sees all of it.
 pub struct Whole {
-    /// Its centre at mean height.
+    /// World position of the field's centre at mean height, metres.
     pub centre: DVec3,
-    /// Half its diagonal, metres.
+    /// Largest distance of a corner of the field's bounding box from the centre, metres.
     pub radius: f64,
-    /// Position of the eye, south of the field and above it.
+    /// World position of the eye, above and to the south of the field, metres.
     pub eye: DVec3,
-    /// Rotation of the eye there.
+    /// Rotation of the eye, from eye to world axes.
     pub world_from_eye: DMat3,
 }
 
 impl Whole {
-    /// Returns the view of a whole field for a horizontal field of view in degrees.
+    /// Finds the view of a field for a horizontal field of view of `fov` degrees and a picture of `size` (x, y) pixels.
+    /// The nearest eye is chosen for which the bounding box fills at most 94 % of the picture.
     pub fn of(field: &Field, fov: f64, size: [u32; 2]) -> Self {
         let statistics = field.statistics();
         let [w, h] = field.size().map(|n| f64::from(n - 1));
@@ -39,12 +40,13 @@ impl Whole {
             tolerance: Tolerance { px: 1.0, metric: Metric::Certified },
             time_s: 0.0,
         };
-        // Returns the rectangle around the corners on the screen, if all are in front of the eye.
+        // Corners (low, high) of the rectangle around the bounding box on the screen; `None` if part of it is behind
+        // the eye.
         let outline = |view: &View| {
             let seen: Option<Vec<_>> = corners.iter().map(|&c| view.project(c).map(|p| p.pixel)).collect();
             seen.map(|s| (s.iter().copied().fold(s[0], DVec2::min), s.iter().copied().fold(s[0], DVec2::max)))
         };
-        // Approaches from afar while all of the field fits, and moves sideways to keep it centred.
+        // Starts far away and approaches as long as the bounding box fits, while moving sideways to keep it centred.
         let half_angle = (fov.to_radians() / 2.0).min(picture.y / (2.0 * at(1.0, DVec3::ZERO).focal_px()));
         let mut view = at(4.0 * radius / half_angle.tan(), DVec3::ZERO);
         let mut aside = DVec3::ZERO;

@@ -1,4 +1,5 @@
-//! `cuesta info --working-set`: draws the nodes of a map over the whole field that a view needs, by level.
+//! `cuesta info --working-set`: draws a map of the virtual texture tiles that a view needs. The virtual texture covers
+//! the whole field. A node is a tile of its quadtree; level 0 is the root.
 
 use std::path::Path;
 
@@ -16,36 +17,47 @@ use crate::texture::wedges;
 use crate::texture::working_set::{TileId, WorkingSet};
 use crate::view::View;
 
-/// Side of the picture, pixels.
+/// Width and height of the picture, pixels.
 const SIDE_PX: u32 = 1024;
-/// The nodes that a view needs, as the device holds them.
+
+/// The nodes that a view needs, and their memory.
 #[derive(Serialize)]
 pub struct Needed {
+    /// Texels of the whole virtual texture.
     map_texels: f64,
+    /// Number of front-facing triangles in view, as wedges of a binary triangle tree. The nodes follow from them.
     wedges: usize,
+    /// Number of nodes.
     nodes: usize,
-    /// Nodes that the texture memory holds.
+    /// Number of nodes that the texture memory can hold.
     slots: u32,
-    /// Bytes of the nodes on the device.
+    /// Device memory of the nodes, bytes.
     bytes: u64,
-    /// Length of a texel on the screen, pixels: 1, or longer where the memory does not suffice.
+    /// Largest length of a texel on the screen, pixels: 1, or more if the memory does not suffice.
     texel_px: f64,
+    /// Texels needed.
     texels: f64,
+    /// Texels needed per pixel of the picture.
     texels_a_pixel: f64,
     /// Number of nodes by level, from the root on.
     levels: Vec<usize>,
-    /// Part of the field that the picture shows, samples: first ones along (x, z), and their number.
+    /// Square of the field that the picture shows, samples: its north-western corner (x, z), and its side.
     shown: [f64; 3],
 }
 
-/// A square of the map: its first corner and its side, shares of the root square.
+/// A square part of the virtual texture, as shares of its root square.
 struct Window {
+    /// North-western corner (x, z).
     first: [f64; 2],
     side: f64,
 }
 
-/// Finds the nodes that a view needs within `texture_bytes`, and draws each in the colour of its level. Smaller textures
-/// are darker; unneeded nodes are grey. The picture shows the smallest square around all nodes below the root.
+/// Finds the nodes that a view needs within `texture_bytes`, and writes a picture of them. The hue shows the level;
+/// nodes that need fewer texels are darker, those not needed are grey. The picture shows the smallest square around all
+/// nodes below the root.
+///
+/// # Errors
+/// If the path does not end in `.png`, the memory is too small for a virtual texture, or the file cannot be written.
 pub fn draw(
     field: &Field,
     technique: &mut dyn Technique,
@@ -55,11 +67,11 @@ pub fn draw(
 ) -> Result<Needed> {
     let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
     ensure!(is_png, Error::new(path.display().to_string(), "extension", "expected .png"));
-    let cut = VirtualGroundLayout::new(field, texture_bytes, MAX_SLOTS as u32).map_err(anyhow::Error::msg)?;
+    let layout = VirtualGroundLayout::new(field, texture_bytes, MAX_SLOTS as u32).map_err(anyhow::Error::msg)?;
     let mut list = DrawList::default();
     technique.select(view, &mut list);
     let wedges = wedges::from_draw_list(field, view, technique.resident(), &list);
-    let mut needed = GroundSet::new(cut);
+    let mut needed = GroundSet::new(layout);
     needed.update(view, &wedges);
     let set = needed.set();
     let mut levels = Vec::new();
@@ -71,10 +83,10 @@ pub fn draw(
     save(path, &picture(set, &window, levels.len()))?;
     let root = f64::from(wedges::root_side(field));
     Ok(Needed {
-        map_texels: texture_area(cut.texture_level()),
+        map_texels: texture_area(layout.texture_level()),
         wedges: wedges.len(),
         nodes: set.tiles().count(),
-        slots: cut.slots,
+        slots: layout.slots,
         bytes: set.tiles().count() as u64 * VirtualGroundLayout::tile_bytes(),
         texel_px: needed.texel_px(),
         texels: set.texels(),
@@ -85,6 +97,7 @@ pub fn draw(
 }
 
 impl Window {
+    /// Returns the smallest square around all nodes below the root; the whole texture if there are none.
     fn around(set: &WorkingSet) -> Self {
         let side = |node: &TileId| 0.5f64.powi(node.level as i32);
         let ends = |k: usize| {
@@ -102,7 +115,7 @@ impl Window {
         Self { first: ends.map(|[low, high]| (low + high - widest) / 2.0), side: widest }
     }
 
-    /// Returns the position of a pixel's centre on the map.
+    /// Returns the position of a pixel's centre on the virtual texture, shares of the root square.
     fn at(&self, x: u32, y: u32) -> [f64; 2] {
         [(0, x), (1, y)].map(|(k, n)| self.first[k] + (f64::from(n) + 0.5) / f64::from(SIDE_PX) * self.side)
     }
@@ -123,6 +136,8 @@ fn picture(set: &WorkingSet, window: &Window, levels: usize) -> RgbaImage {
     })
 }
 
+/// Returns the colour of a pixel at the position `at` in a node. `pixel_side` is the side of a pixel, a share of the
+/// root square.
 fn colour(node: TileId, resolution: u32, at: [f64; 2], pixel_side: f64) -> Rgba<u8> {
     let side = 0.5f64.powi(node.level as i32);
     // A line one pixel wide surrounds each node that is large enough for it.

@@ -1,5 +1,7 @@
 //! Errors about height files.
 
+use super::damage::in_plain_words;
+
 /// An error about a file or an option: the file, the field or position in it, what was expected and what was found.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {place}: {what}")]
@@ -15,7 +17,7 @@ pub struct Error {
 impl Error {
     /// Makes an error at a place of a file.
     pub fn new(file: impl Into<String>, place: impl Into<String>, what: impl ToString) -> Self {
-        Self { file: file.into(), place: place.into(), what: one_line(what.to_string()) }
+        Self { file: file.into(), place: place.into(), what: in_plain_words(one_line(what.to_string())) }
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod bezier;
 pub mod bounds;
 pub mod cave;
+mod damage;
 pub mod demo;
 pub(crate) mod disk_cache;
 mod error;
@@ -31,7 +32,7 @@ pub use formats::{
     Encoding, FORMATS, Footprint, Format, HoleFill, Loaded, Located, MAX_SIDE, Options, Order, RawLayout, SampleType,
     SourceFile, load, load_all, load_bytes, load_bytes_with, number, place_of,
 };
-pub use georef::{Place, Unit, metres_per_degree};
+pub use georef::{Place, Unit, extent::Extent, metres_per_degree};
 pub use holes::Holes;
 pub use procedural::Procedural;
 pub use raster::Raster;

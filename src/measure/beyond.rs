@@ -1,7 +1,9 @@
-//! Pixels that show land further from where it belongs than the tolerance says, from what a frame left in the depth
-//! buffer: the point that a pixel's centre shows against the point above or below it on the samples' own triangles, both
-//! projected exactly. Meshes of coarser levels are flat on each of those triangles, so no pixel has a larger error than
-//! some sample around it ([`geometric`](super::geometric)).
+//! Counts the pixels whose screen error exceeds the tolerance, from the depth buffer of a frame.
+//!
+//! The depth of a pixel gives the world point that its centre shows. Its error is the distance on the screen from the
+//! point above or below it on the surface of the samples, both projected exactly. Coarser meshes are flat on each
+//! triangle of that surface, so no pixel has a larger error than the samples around it have
+//! ([`geometric`](super::geometric)).
 
 use rayon::prelude::*;
 
@@ -10,8 +12,8 @@ use crate::height::Field;
 use crate::height::surface;
 use crate::view::View;
 
-/// Pixels beyond the view's tolerance, of reversed depth (0 where nothing is drawn) row by row from the top. What shows
-/// no point above or below land with data is none.
+/// Returns the number of pixels whose error exceeds the view's tolerance. `depth` is reversed (0 where nothing is
+/// drawn), row by row from the top. Pixels that show a point without terrain above or below it are not counted.
 pub fn pixels(field: &Field, view: &View, depth: &[f32]) -> u64 {
     let width = view.size[0] as usize;
     let is_beyond = |k: usize, depth: f32| {
@@ -30,7 +32,7 @@ mod tests {
     use crate::view::{Lens, Metric, Tolerance};
     use glam::DVec3;
 
-    /// Depth of the level plane at a height, in one column of pixels.
+    /// Returns the depth at which a pixel shows the level plane at height `y`.
     fn depth_at(view: &View, pixel: [usize; 2], y: f64) -> f32 {
         let [low, high] = [0.0, 1.0].map(|depth| shown(view, pixel, depth).y);
         ((y - low) / (high - low)) as f32

@@ -1,7 +1,7 @@
-//! Cost of triangles: their number, how many of them show, and their size on the screen.
+//! Counts triangles by visibility and by size on the screen.
 //!
-//! A triangle's size is the exact area of its projection, clipped to the picture. Parts hidden by other terrain are not
-//! subtracted; triangles hidden as a whole are counted ([`Depths`]).
+//! The size of a triangle is the exact area of its projection, clipped to the picture. Parts that other terrain hides
+//! are not subtracted. Triangles that are hidden as a whole are counted ([`Depths`]).
 
 use glam::DVec4;
 use schemars::JsonSchema;
@@ -18,32 +18,33 @@ use crate::height::Field;
 use crate::height::surface::{self, Triangle};
 use crate::view::View;
 
-/// Powers of two, px², between which the histogram has its bins: from 1/256 px² to more than any picture has.
+/// Range of the histogram's bin ends, powers of two: from 1/256 px² to more than the area of any picture.
 const BINS: [i32; 2] = [-8, 24];
 
-/// Share of triangles that are small or hidden, and of fragments that are drawn over.
+/// Shares of small and hidden triangles, and overdraw.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Economy {
-    /// Triangles in view by their area, pixels.
+    /// Triangles in view by their area on the screen, pixels.
     pub pixels_per_triangle: Histogram,
     /// Share of the triangles in view that terrain in front hides, 0 to 1.
     #[serde(default)]
     pub hidden_share: f64,
-    /// Share of the triangles in view that are smaller than one pixel, 0 to 1.
+    /// Share of the triangles in view whose area is below one pixel, 0 to 1.
     pub subpixel_share: f64,
-    /// Fragments run per covered pixel, by the driver's counters. Software devices count whole blocks of pixels.
+    /// Fragment shader invocations per covered pixel, by pipeline statistics. Software devices count whole blocks of
+    /// pixels.
     pub overdraw: Option<f64>,
-    /// Fragments that passed the depth test per covered pixel: 1 if nothing is drawn over.
+    /// Fragments that passed the depth test per covered pixel; 1 if no pixel is drawn twice.
     #[serde(default)]
     pub passed: Option<f64>,
 }
 
 impl Economy {
-    /// Returns the shares of these triangles.
+    /// Computes the shares of these triangles.
     ///
-    /// `fragments` are those run and those that passed the depth test, `None` where the device does not count them.
-    /// `covered` is the number of pixels that they cover.
+    /// `fragments` are the fragment shader invocations and the fragments that passed the depth test; `None` where the
+    /// device does not count them. `covered` is the number of pixels that the triangles cover.
     pub fn new(triangles: &Triangles, fragments: [Option<u64>; 2], covered: u64) -> Self {
         let share = |count: u64| count as f64 / triangles.shown.max(1) as f64;
         let per_pixel = |fragments: u64| (covered > 0).then(|| fragments as f64 / covered as f64);
@@ -63,7 +64,7 @@ impl Economy {
 pub struct Triangles {
     /// Triangles submitted.
     pub submitted: u64,
-    /// Of these, triangles without area in plan.
+    /// Of these, triangles without area in plan view.
     pub degenerate: u64,
     /// Triangles wholly outside the picture.
     pub outside: u64,
@@ -71,15 +72,16 @@ pub struct Triangles {
     pub facing_away: u64,
     /// Triangles at least partly in the picture that face the eye.
     pub shown: u64,
-    /// Of the shown, triangles that terrain in front hides.
+    /// Of the shown triangles, those that terrain in front hides.
     pub hidden: u64,
-    /// Area of all shown triangles in the picture, pixels.
+    /// Total area of the shown triangles in the picture, pixels.
     pub area_px: f64,
-    /// The shown triangles by their area in the picture, pixels: bin ends from 2^−8 to 2^24.
+    /// Shown triangles by their area in the picture, pixels. Bins end at 2^−8 to 2^24.
     pub sizes_px: Histogram,
 }
 
-/// Measures the triangles of a list. `depth` is the depth buffer after drawing it, one value a pixel.
+/// Counts the triangles of a draw list. `depth` is the depth buffer after drawing it: reversed, row by row from the
+/// top.
 pub fn triangles(field: &Field, view: &View, resident: &Geometry, list: &DrawList, depth: &[f32]) -> Triangles {
     let screen = Screen::new(field, view, depth);
     let mut total = Triangles::default();
@@ -105,7 +107,7 @@ impl Default for Triangles {
 }
 
 impl Triangles {
-    /// Returns the number of shown triangles smaller than 1 px².
+    /// Returns the number of shown triangles with an area below 1 px².
     pub fn sub_pixel(&self) -> u64 {
         self.sizes_px.bins.iter().filter(|bin| bin.from < 1.0).map(|bin| bin.count).sum()
     }
@@ -122,7 +124,8 @@ impl Triangles {
         self.sizes_px.merge(&part.sizes_px);
     }
 
-    /// Counts a triangle by its signed area in the picture and its visibility; `None` if it lies outside.
+    /// Counts a triangle by its signed area in the picture, pixels, and true if it is hidden; `None` if it lies
+    /// outside.
     fn add(&mut self, seen: Option<(f64, bool)>) {
         match seen {
             None => self.outside += 1,
@@ -137,7 +140,7 @@ impl Triangles {
     }
 }
 
-/// Data for projecting triangles.
+/// Projects the triangles of one view and tests whether they are hidden.
 struct Screen<'a> {
     field: &'a Field,
     view: &'a View,
@@ -168,7 +171,7 @@ impl<'a> Screen<'a> {
             self.clip_from_relative * (point - self.view.eye).extend(1.0)
         });
         let [w, h] = self.view.size.map(f64::from);
-        // Two units of clip space across the picture; its y points down, which turns the sense round.
+        // The picture is two units of clip space wide and high. Triangles that face the eye have a negative area there.
         clipped(corners).map(|polygon| (-signed_area(&polygon) * w * h / 4.0, self.depths.hide(&polygon)))
     }
 }
@@ -179,8 +182,8 @@ fn inside(p: DVec4) -> [f64; 6] {
     [p.w - p.x, p.w + p.x, p.w - p.y, p.w + p.y, p.w - p.z, p.z]
 }
 
-/// The part of a triangle in the picture (Sutherland and Hodgman 1974, in homogeneous coordinates); `None` if
-/// there is none.
+/// Returns the part of a triangle that lies in the picture, by clipping in homogeneous coordinates (Sutherland and
+/// Hodgman 1974); `None` if it lies outside.
 fn clipped(corners: [DVec4; 3]) -> Option<Vec<DVec4>> {
     let inner = corners.map(inside);
     if (0..6).any(|plane| inner.iter().all(|corner| corner[plane] <= 0.0)) {
@@ -193,7 +196,7 @@ fn clipped(corners: [DVec4; 3]) -> Option<Vec<DVec4>> {
     (polygon.len() >= 3).then_some(polygon)
 }
 
-/// The part of a polygon on the inner side of a plane.
+/// Returns the part of a polygon on the inner side of a clipping plane, one of those of [`inside`].
 fn cut(polygon: &[DVec4], plane: usize) -> Vec<DVec4> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (k, &to) in polygon.iter().enumerate() {
@@ -209,7 +212,7 @@ fn cut(polygon: &[DVec4], plane: usize) -> Vec<DVec4> {
     kept
 }
 
-/// Area of a polygon of clip space once divided by w, positive if it runs anticlockwise with y up.
+/// Returns the area of a polygon after division by w. It is positive if the corners run anticlockwise with y up.
 fn signed_area(polygon: &[DVec4]) -> f64 {
     let flat = |p: DVec4| [p.x / p.w, p.y / p.w];
     let origin = flat(polygon[0]);

@@ -1,4 +1,4 @@
-//! Counts of non-negative values by powers of two.
+//! Histograms of non-negative values with bins between powers of two.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ impl Histogram {
 
     /// Counts a value, which must not be negative or NaN.
     pub fn add(&mut self, value: f64) {
-        // The exponents themselves: a logarithm could round across the end of a bin.
+        // Compares binary exponents, as a logarithm could round across the end of a bin.
         let exponent = |value: f64| (value.to_bits() >> 52 & 0x7ff) as i32;
         let bin = exponent(value) - exponent(self.bins[0].to) + 1;
         let last = self.bins.len() as i32 - 1;

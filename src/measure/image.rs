@@ -1,10 +1,10 @@
-//! Difference of a picture from a reference of the same size: RMSE, PSNR, SSIM and FLIP.
+//! Measures the difference of a picture from a reference picture: RMSE, PSNR, SSIM and FLIP.
 //!
 //! - SSIM: Z. Wang, A. Bovik, H. Sheikh and E. Simoncelli, "Image Quality Assessment: From Error Visibility to
-//!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of §III.C, on luma
-//!   (Rec. 601, not rounded), averaged over the windows that lie wholly in the picture;
-//! - FLIP: P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020), by its authors'
-//!   own program, at [`PIXELS_PER_DEGREE`].
+//!   Structural Similarity" (2004), eq. 13, with the constants and the Gaussian window of section III.C. It is computed
+//!   on luma (Rec. 601, not rounded) and averaged over all windows that lie inside the picture.
+//! - FLIP: P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020), by the authors'
+//!   implementation, at [`PIXELS_PER_DEGREE`].
 
 use image::RgbImage;
 use nv_flip::{FlipImageRgb8, flip as authors_flip, magma_lut};
@@ -17,29 +17,30 @@ use super::extended::{self, Extended};
 /// Viewing condition of FLIP, pixels per degree: a screen 0.7 m wide with 3840 pixels, seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
-/// Samples along a side of SSIM's window, and its standard deviation.
+/// Pixels along a side of SSIM's window.
 const WINDOW: usize = 11;
+/// Standard deviation of SSIM's Gaussian weights, pixels.
 const SIGMA: f64 = 1.5;
 
-/// Pictures against their references: means over all pairs.
+/// Differences of several pictures from their references.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageError {
-    /// Root mean square difference, as a share of a channel's full range.
+    /// Root mean square difference of colour channels over all pictures, as a share of the full range, 0 to 1.
     #[schemars(range(min = 0.0))]
     pub rmse: f64,
-    /// Peak signal-to-noise ratio, decibels; infinite for equal pictures.
+    /// Peak signal-to-noise ratio of that difference, decibels; infinite for equal pictures.
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub psnr: f64,
-    /// Structural similarity; 1 for equal pictures.
+    /// Mean structural similarity (SSIM); 1 for equal pictures.
     pub ssim: f64,
-    /// FLIP; 0 for equal pictures.
+    /// Mean FLIP, 0 to 1; 0 for equal pictures.
     #[schemars(range(min = 0.0))]
     pub flip: f64,
 }
 
 impl ImageError {
-    /// Returns the means; the ratio is that of the mean noise. `None` without pictures.
+    /// Combines the differences of pictures; `None` without pictures.
     pub fn mean(pictures: &[Difference]) -> Option<Self> {
         let mean = |of: fn(&Difference) -> Option<f64>| {
             let values: Vec<f64> = pictures.iter().filter_map(of).collect();
@@ -55,22 +56,22 @@ impl ImageError {
     }
 }
 
-/// One picture against its reference.
+/// Difference of one picture from its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Root of the mean square over all pixels and channels, in steps of 1/255.
+    /// Root mean square difference over all pixels and channels, 0 to 255.
     pub rmse: f64,
-    /// Peak signal to noise, decibels; `None` for equal pictures, which have no noise.
+    /// Peak signal-to-noise ratio, decibels; `None` for equal pictures.
     pub psnr_db: Option<f64>,
-    /// Mean structural similarity, 1 for equal pictures; `None` if no window fits into the picture.
+    /// Mean structural similarity; 1 for equal pictures, `None` if the picture is smaller than the window.
     pub ssim: Option<f64>,
-    /// Mean of FLIP over all pixels, 0 for equal pictures, at most 1.
+    /// Mean FLIP over all pixels, 0 to 1; 0 for equal pictures.
     pub flip_mean: f64,
-    /// Largest FLIP of a pixel.
+    /// Largest FLIP of a pixel, 0 to 1.
     pub flip_max: f64,
 }
 
-/// The pictures differ in size.
+/// Error: the pictures differ in size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("compared pictures: size: expected {0} × {1} pixels as the reference has, found {2} × {3}", .reference.0, .reference.1, .picture.0, .picture.1)]
 pub struct SizesDiffer {
@@ -80,8 +81,11 @@ pub struct SizesDiffer {
     pub reference: (u32, u32),
 }
 
-/// Compares a picture with its reference. Also returns FLIP of every pixel in the colours of its paper:
-/// from black for none over violet and orange to pale yellow.
+/// Compares a picture with its reference. Also returns a picture of FLIP with the paper's colours, from black (equal)
+/// to pale yellow.
+///
+/// # Errors
+/// If the pictures differ in size.
 pub fn compare(picture: &RgbImage, reference: &RgbImage) -> Result<(Difference, RgbImage), SizesDiffer> {
     if picture.dimensions() != reference.dimensions() {
         return Err(SizesDiffer { picture: picture.dimensions(), reference: reference.dimensions() });
@@ -104,7 +108,7 @@ fn rmse(picture: &RgbImage, reference: &RgbImage) -> f64 {
     (sum as f64 / picture.as_raw().len().max(1) as f64).sqrt()
 }
 
-/// FLIP of each pixel, and the same in colours.
+/// Returns FLIP of each pixel, and a picture of it.
 fn flip(picture: &RgbImage, reference: &RgbImage) -> (Vec<f32>, RgbImage) {
     let (width, height) = picture.dimensions();
     let [picture, reference] = [picture, reference].map(|p| FlipImageRgb8::with_data(width, height, p));
@@ -113,24 +117,26 @@ fn flip(picture: &RgbImage, reference: &RgbImage) -> (Vec<f32>, RgbImage) {
     (map.to_vec(), RgbImage::from_raw(width, height, colours).expect("three bytes a pixel"))
 }
 
-/// Numbers row by row.
+/// A single-channel picture, row by row.
 struct Plane {
     width: usize,
     values: Vec<f64>,
 }
 
 impl Plane {
+    /// Returns the luma of a picture (Rec. 601), 0 to 255.
     fn luma(picture: &RgbImage) -> Self {
         let luma = |p: &image::Rgb<u8>| 0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2]);
         Self { width: picture.width() as usize, values: picture.pixels().map(luma).collect() }
     }
 
+    /// Returns the product of two planes, pixel by pixel.
     fn product(&self, other: &Plane) -> Self {
         let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
         Self { width: self.width, values }
     }
 
-    /// The weighted mean of every window that lies wholly inside.
+    /// Returns the weighted mean of every window that lies inside. The weights are those along one axis.
     fn windowed(&self, weights: &[f64; WINDOW]) -> Vec<f64> {
         let height = self.values.len() / self.width;
         let mean = |start: usize, stride: usize, values: &[f64]| -> f64 {
@@ -145,6 +151,7 @@ impl Plane {
     }
 }
 
+/// Returns the mean SSIM over all windows; `None` if the picture is smaller than a window.
 fn ssim(picture: &RgbImage, reference: &RgbImage) -> Option<f64> {
     if (picture.width().min(picture.height()) as usize) < WINDOW {
         return None;
@@ -157,13 +164,14 @@ fn ssim(picture: &RgbImage, reference: &RgbImage) -> Option<f64> {
     Some((0..count).map(similar).sum::<f64>() / count as f64)
 }
 
-/// Of two windows by the means of x, y, x², y² and x·y.
+/// Returns the SSIM of two windows with pixels x and y from the means of x, y, x², y² and x·y.
 fn similarity([x, y, xx, yy, xy]: [f64; 5]) -> f64 {
     let (c1, c2) = ((0.01f64 * 255.0).powi(2), (0.03f64 * 255.0).powi(2));
     let numerator = (2.0 * x * y + c1) * (2.0 * (xy - x * y) + c2);
     numerator / ((x * x + y * y + c1) * (xx - x * x + yy - y * y + c2))
 }
 
+/// Returns the weights of a window along one axis; their sum is 1.
 fn gaussian() -> [f64; WINDOW] {
     let weight = |k: usize| (-((k as f64 - (WINDOW / 2) as f64) / SIGMA).powi(2) / 2.0).exp();
     let sum: f64 = (0..WINDOW).map(weight).sum();
@@ -212,7 +220,7 @@ mod tests {
         assert!((figures.psnr_db.unwrap() - 10.0 * (255.0 * 255.0 / 150f64).log10()).abs() < 1e-12);
     }
 
-    /// Without contrast only the means are compared.
+    /// Of plain pictures, SSIM compares only the means.
     #[test]
     fn ssim_of_plain_pictures_by_hand() {
         let (a, b) = (picture([16, 11], |_, _| [100; 3]), picture([16, 11], |_, _| [140; 3]));
@@ -225,7 +233,7 @@ mod tests {
         }
     }
 
-    /// The window of the paper, over the definition of variance instead of means of squares.
+    /// SSIM of a single window, with variances computed by their definition instead of means of squares.
     #[test]
     fn ssim_of_one_window_by_its_definition() {
         let whole = |seed| picture([11, 11], |x, y| [speckled(seed, 60).get_pixel(x, y)[0]; 3]);
@@ -253,8 +261,8 @@ mod tests {
         assert!(slight.ssim > strong.ssim && slight.flip_mean < strong.flip_mean && slight.flip_mean > 0.0);
     }
 
-    /// FLIP of two plain colours, by the paper: filters and features leave them alone, so that it is the
-    /// redistributed HyAB distance of the Hunt-adjusted colours.
+    /// FLIP of plain pictures by the paper's formulas. Without edges, it is the remapped HyAB distance of the
+    /// Hunt-adjusted colours.
     #[test]
     fn flip_of_plain_pictures_by_hand() {
         let colours = [[0, 0, 0], [255, 255, 255], [200, 30, 60], [190, 40, 60], [0, 255, 0], [0, 0, 255]];
@@ -268,7 +276,7 @@ mod tests {
 
     fn flip_of_colours(a: [u8; 3], b: [u8; 3]) -> f64 {
         let distance = |a, b| hyab(hunt_adjusted(a), hunt_adjusted(b)).powf(0.7);
-        // The colour pipeline's end: the largest distance is that of green and blue; up to 0.4 of it takes 0.95 of the range.
+        // The paper's remapping: the largest distance is that of green and blue, and 40 % of it maps to 0.95.
         let (largest, found) = (distance([0, 255, 0], [0, 0, 255]), distance(a, b));
         let knee = 0.4 * largest;
         if found < knee { found / knee * 0.95 } else { 0.95 + (found - knee) / (largest - knee) * 0.05 }

@@ -1,11 +1,13 @@
-//! The error that other terrain renderers were measured with, from what a frame left in the depth buffer.
+//! The error metric under which other terrain renderers ("peers") were measured, from the depth buffer of a frame.
 //!
-//! For each covered pixel the point P that its centre shows is worked out from the depth; the error is
-//! |P.y − h(P.x, P.z)| · f / |eye − P| pixels, where h is the field interpolated bilinearly and f the focal length
-//! in pixels (869.117 at 1280 × 720 and 45° from bottom to top). It is no exact screen error as
-//! [`geometric`](super::geometric) has it: a vertical distance is taken as if it were seen at a right angle, the
-//! far side of a ridge is no part of it, and drawing every sample as triangles does not score 0, since a cell's
-//! triangles are not its bilinear patch. Frames are pooled: every pixel of every frame weighs the same.
+//! The depth of a covered pixel gives the world point P that its centre shows. The error is
+//! |P.y − h(P.x, P.z)| · f / |eye − P| pixels. Here h is the bilinear interpolation of the field, and f is the focal
+//! length in pixels (869.117 at 1280 × 720 and a vertical field of view of 45°). All pixels of all frames have the same
+//! weight.
+//!
+//! Differences from the exact screen error of [`geometric`](super::geometric): vertical distances count as if seen at a
+//! right angle. The far side of a ridge is not measured. A mesh of all samples does not score 0, as the two triangles
+//! of a cell differ from its bilinear patch.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,16 +18,16 @@ use super::extended;
 use crate::height::Field;
 use crate::view::{Lens, View};
 
-/// Errors of all pixels of all frames so far. Four bytes a pixel.
+/// Errors of all pixels of the frames so far. Needs four bytes per pixel.
 #[derive(Clone, Debug, Default)]
 pub struct Pool {
     errors_px: Vec<f32>,
-    /// Number of covered pixels without terrain above or below the shown point, by rounding at a border or a hole. They
-    /// have no error.
+    /// Number of covered pixels that show a point without terrain above or below it, due to rounding at borders and holes.
+    /// They have no error.
     beside: u64,
 }
 
-/// The peers' metric, pixels, pooled over frames.
+/// Error of the drawn pixels as other terrain renderers were measured, over all measured frames, pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct PeersError {
@@ -42,10 +44,10 @@ pub struct PeersError {
 }
 
 impl Pool {
-    /// Adds a frame: reversed depth (1 at the near plane, 0 where nothing is drawn) row by row from the top.
+    /// Adds a frame. `depth` is reversed (1 at the near plane, 0 where nothing is drawn), row by row from the top.
     ///
     /// # Panics
-    /// If there is not one depth for each of the view's pixels.
+    /// If the number of depths is not that of the view's pixels.
     pub fn add(&mut self, field: &Field, view: &View, depth: &[f32]) {
         let [width, height] = view.size.map(|n| n as usize);
         assert_eq!(depth.len(), width * height, "a depth for each pixel");
@@ -61,7 +63,7 @@ impl Pool {
         self.errors_px.len() as u64 + self.beside
     }
 
-    /// Returns the statistics of all errors so far; zeros without any. Percentiles are exact, by rank.
+    /// Returns the statistics of all errors so far; zeros without errors. Percentiles are exact, by nearest rank.
     pub fn summary(&self) -> PeersError {
         let mut sorted = self.errors_px.clone();
         sorted.par_sort_unstable_by(f32::total_cmp);
@@ -69,7 +71,7 @@ impl Pool {
         if n == 0 {
             return PeersError::default();
         }
-        // Summed from the smallest on: the same on every machine, with the least rounding.
+        // Summing in ascending order gives the same result on every machine, and rounds least.
         let sum = |power: i32| sorted.iter().map(|&e| f64::from(e).powi(power)).sum::<f64>() / n as f64;
         let percentile = |percent: usize| f64::from(sorted[(n * percent).div_ceil(100) - 1]);
         PeersError {
@@ -82,17 +84,18 @@ impl Pool {
     }
 }
 
+/// Returns the error of a pixel (column, row), pixels; `None` without terrain above or below the point that it shows.
 fn error_px(field: &Field, view: &View, pixel: [usize; 2], depth: f32) -> Option<f32> {
     let point = shown(view, pixel, depth);
     let scale = match view.lens {
         Lens::Perspective { .. } => view.focal_px() / point.distance(view.eye),
-        // Parallel rays: as far away as may be.
+        // The scale of an orthographic view does not depend on the distance.
         Lens::Orthographic { .. } => view.focal_px(),
     };
     field.height_at(point.x, point.z).map(|height| ((point.y - height).abs() * scale) as f32)
 }
 
-/// The world point that the centre of a pixel (column, row) shows at a reversed depth above 0: the inverse of
+/// Returns the world point that the centre of a pixel (column, row) shows at a reversed depth above 0. Inverts
 /// [`View::clip_from_relative`].
 pub fn shown(view: &View, pixel: [usize; 2], depth: f32) -> DVec3 {
     let aside = |k: usize| (pixel[k] as f64 + 0.5 - f64::from(view.size[k]) / 2.0) / view.focal_px();
@@ -137,7 +140,7 @@ mod tests {
         [Lens::Perspective { fov_x: 1.2 }, Lens::Orthographic { width: 70.0, far: 400.0 }]
     }
 
-    /// The samples' own triangles, `lift` metres higher than they are.
+    /// Returns the triangles of the samples' surface, raised by `lift` metres.
     fn surface(field: &Field, lift: f64) -> Vec<[DVec3; 3]> {
         let last = SIDE as i32 - 1;
         let cells = (0..last).flat_map(|j| (0..last).map(move |i| (i, j)));

@@ -1,25 +1,25 @@
-//! Faults in a picture: pixels where the sky shines through terrain.
+//! Finds pixels of a picture where the sky shows through terrain.
 
-/// Returns the smallest distance, pixels, of a hole from the terrain's outline in the reference picture. The tolerance
-/// may move the outline by as much, and rasterisation by one pixel more.
+/// Returns the smallest distance from the terrain's outline in the reference picture at which a missing pixel is a
+/// hole, pixels. Closer to it, the tolerance may have moved the outline, and rasterisation by one more pixel.
 pub fn outline_radius(tolerance_px: f64) -> usize {
     tolerance_px.ceil() as usize + 1
 }
 
-/// Dilates a mask: pixels that any pixel of `mask` comes within `radius` of (in x and in y).
+/// Dilates a mask: selects all pixels within `radius` of a selected one, in x and in y.
 ///
 /// # Panics
-/// If the mask is no whole number of rows.
+/// If the mask does not consist of whole rows.
 pub fn dilated(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
     let open: Vec<bool> = mask.iter().map(|m| !m).collect();
     inside(&open, width, radius).into_iter().map(|m| !m).collect()
 }
 
-/// Pixels, row by row, that `covered` leaves open although `truth` covers every pixel of the picture within
-/// `radius` of them (in x and in y).
+/// Returns the pixels, numbered row by row, that `covered` does not contain although `truth` contains all pixels within
+/// `radius` of them, in x and in y.
 ///
 /// # Panics
-/// If the two differ in size or are no whole number of rows.
+/// If the masks differ in size or do not consist of whole rows.
 pub fn hole_pixels(covered: &[bool], truth: &[bool], width: usize, radius: usize) -> Vec<usize> {
     assert_eq!(covered.len(), truth.len(), "two pictures of one size");
     assert!(width > 0 && covered.len().is_multiple_of(width), "whole rows");
@@ -27,7 +27,8 @@ pub fn hole_pixels(covered: &[bool], truth: &[bool], width: usize, radius: usize
     (0..covered.len()).filter(|&k| inner[k] && !covered[k]).collect()
 }
 
-/// Pixels whose neighbourhood is all covered. A square is eroded along x, then along y.
+/// Erodes a mask by a square: keeps the pixels all of whose neighbours within `radius` are set. Works along x, then
+/// along y.
 fn inside(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
     let height = mask.len() / width;
     let mut rows = vec![false; mask.len()];
@@ -41,7 +42,7 @@ fn inside(mask: &[bool], width: usize, radius: usize) -> Vec<bool> {
     both
 }
 
-/// Keeps, along one line of pixels, those with no open pixel within `radius`.
+/// Erodes one line of pixels: keeps those without an unset pixel within `radius`.
 fn erode(line: impl ExactSizeIterator<Item = usize> + Clone, from: &[bool], to: &mut [bool], radius: usize) {
     let mut ahead = line.clone().enumerate().filter(|&(_, k)| !from[k]).map(|(n, _)| n).peekable();
     let mut behind = None;

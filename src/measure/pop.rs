@@ -1,10 +1,10 @@
-//! The pop meter: how far the surface jumps on the screen from one frame to the next by the change of its level
-//! of detail alone.
+//! Measures popping: how far the surface moves on the screen between two frames due to the change of level of detail
+//! alone.
 //!
-//! The list of frame t − 1 and that of frame t are both laid over the lattice, each as its own eye had it, morph weights
-//! included, and both are seen in the view of frame t. Every sample with data that both cover, and whose point on the
-//! newer surface is in view, is measured once: the way between its two points on the screen, both projected in f64 as
-//! in [`geometric`](super::geometric).
+//! The draw lists of frames t − 1 and t give two surfaces, each as drawn for its own view, morphing included. Both are
+//! projected with the view of frame t, so that the motion of the camera has no effect. A sample with data counts once,
+//! if both surfaces cover it and its point on the newer one is in view. Its displacement is the distance between its
+//! two points on the screen, in f64 as in [`geometric`](super::geometric).
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -23,29 +23,29 @@ use crate::height::Field;
 use crate::height::surface;
 use crate::view::View;
 
-/// Powers of two, px, between which the histogram has its bins: from 1/64 px, far below what anybody sees, to 64.
+/// Range of the histogram's bin ends, powers of two: from 1/64 px, which is invisible, to 64 px.
 const BINS: [i32; 2] = [-6, 6];
 
-/// The data of a drawn frame. A technique with uploads changes its resident geometry from frame to frame: the earlier
-/// state then needs a copy of it.
+/// A drawn frame. Techniques may change their resident geometry from frame to frame; the earlier state then needs a
+/// copy.
 #[derive(Clone, Copy, Debug)]
 pub struct State<'a> {
-    /// The view that the list was made for.
+    /// View that the list was made for.
     pub view: &'a View,
-    /// The technique's resident geometry at that frame.
+    /// Resident geometry of the technique in this frame.
     pub resident: &'a Geometry,
-    /// The draw list of that frame.
+    /// Draw list of this frame.
     pub list: &'a DrawList,
 }
 
 /// Displacement of the surface on the screen when the level of detail changes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pop {
-    /// 99th percentile, pixels: of several frames, the largest of any frame.
+    /// 99th percentile over samples, pixels: the largest of any frame.
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub p99_px: f64,
-    /// 99.9th percentile, pixels: of several frames, the largest of any frame.
+    /// 99.9th percentile over samples, pixels: the largest of any frame.
     #[serde(with = "extended", default)]
     #[schemars(with = "Extended")]
     pub p999_px: f64,
@@ -53,7 +53,7 @@ pub struct Pop {
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub max_px: f64,
-    /// Samples by displacement, pixels.
+    /// Number of samples by displacement, pixels.
     pub histogram: Histogram,
 }
 
@@ -67,8 +67,8 @@ impl Pop {
     }
 }
 
-/// Measures the jump from the level of detail of frame t − 1 to that of frame t in the view of frame t. Takes
-/// eight bytes a sample of the field while it runs.
+/// Measures the displacement from the surface of frame t − 1 to that of frame t, in the view of frame t. Needs eight
+/// bytes per sample of the field.
 pub fn pop(field: &Field, before: State, after: State) -> Pop {
     let meter = Meter { field, projection: Projection::new(after.view) };
     let heights = meter.heights(before);
@@ -81,6 +81,7 @@ pub fn pop(field: &Field, before: State, after: State) -> Pop {
     Pop { p99_px: tally.quantile(), p999_px: tally.quantile_above(1000), max_px: tally.largest, histogram }
 }
 
+/// Measures displacements in the view of the newer frame.
 struct Meter<'a> {
     field: &'a Field,
     projection: Projection,
@@ -96,7 +97,7 @@ impl Meter<'_> {
         z as usize * self.field.size()[0] as usize + x as usize
     }
 
-    /// Calls `visit` for every sample of a part that the part's triangles count, with the drawn height.
+    /// Calls `visit` for every sample that the triangles of a part count ([`owns`]), with the drawn height, metres.
     fn samples(&self, state: State, part: &Draw, mut visit: impl FnMut(u32, u32, f64)) {
         let last = self.field.size().map(|n| n as i32 - 1);
         let frame = Frame::placing(self.field, state.view);
@@ -110,8 +111,8 @@ impl Meter<'_> {
         });
     }
 
-    /// The drawn height at every sample, as bits; not a number where nothing is drawn. One triangle counts a
-    /// sample, so no two threads write one place, and the order does not matter.
+    /// Returns the bits of the drawn height at every sample, NaN where nothing is drawn. Each sample is counted by one
+    /// triangle, so threads never write the same element.
     fn heights(&self, state: State) -> Vec<AtomicU64> {
         let [w, h] = self.field.size().map(|n| n as usize);
         let heights: Vec<_> = (0..w * h).map(|_| AtomicU64::new(f64::NAN.to_bits())).collect();
@@ -120,6 +121,7 @@ impl Meter<'_> {
         heights
     }
 
+    /// Measures the samples of a part of the newer list. `before` are the heights in the earlier frame.
     fn part(&self, before: &[AtomicU64], after: State, part: &Draw) -> (Tally, Histogram) {
         let (mut tally, mut histogram) = self.empty();
         self.samples(after, part, |x, z, y| {

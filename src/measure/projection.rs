@@ -1,10 +1,10 @@
-//! A view made ready to project many points.
+//! Projection of many points with one view.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::view::{Lens, Projected, View};
 
-/// The per-view constants of [`View::project`].
+/// Precomputed constants of [`View::project`].
 pub struct Projection {
     eye: DVec3,
     eye_from_world: DMat3,
@@ -16,7 +16,7 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// Of a view.
+    /// Precomputes the constants of a view.
     pub fn new(view: &View) -> Self {
         let (is_perspective, far) = match view.lens {
             Lens::Perspective { .. } => (true, f64::INFINITY),
@@ -33,8 +33,8 @@ impl Projection {
         }
     }
 
-    /// Projects a point, also one before the near plane. `None` at or behind the eye of a perspective view, where it has
-    /// no image.
+    /// Projects a world point, even one before the near plane. Returns `None` at or behind the eye of a perspective
+    /// view.
     #[inline]
     pub fn project(&self, point: DVec3) -> Option<Projected> {
         let at = self.eye_from_world * (point - self.eye);
@@ -44,7 +44,7 @@ impl Projection {
         (!self.is_perspective || depth > 0.0).then_some(Projected { pixel, depth })
     }
 
-    /// The same, if it falls into the picture, between the near and the far plane.
+    /// Projects a world point if it lies in the picture and between the near and the far plane.
     #[inline]
     pub fn project_seen(&self, point: DVec3) -> Option<Projected> {
         let seen = |at: &Projected| {
@@ -55,13 +55,15 @@ impl Projection {
         self.project(point).filter(seen)
     }
 
-    /// Pixels between a point on the screen and another point of the world; infinite if that has no image.
+    /// Returns the distance on the screen between a projected point and a world point, pixels; infinite if the latter
+    /// has no projection.
     #[inline]
     pub fn distance_px(&self, from: &Projected, to: DVec3) -> f64 {
         self.project(to).map_or(f64::INFINITY, |to| from.pixel.distance(to.pixel))
     }
 
-    /// The squared cosine of the angle off the view axis at which a point with a projection lies; 1 for parallel rays.
+    /// Returns the squared cosine of a point's angle off the view axis; 1 in an orthographic view. `at` is the point's
+    /// projection.
     #[inline]
     pub fn squared_cosine(&self, point: DVec3, at: &Projected) -> f64 {
         if self.is_perspective { at.depth * at.depth / point.distance_squared(self.eye) } else { 1.0 }

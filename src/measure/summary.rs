@@ -1,4 +1,5 @@
-//! A quantity over many samples: count, root mean square, an exact high quantile, the largest and where it is.
+//! Statistics of a quantity over many samples: count, root mean square, an exact high quantile, and the maximum with
+//! its position.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,14 +10,14 @@ use serde::{Deserialize, Serialize};
 
 use super::extended::{self, Extended};
 
-/// A quantity over all samples in view.
+/// Statistics of a quantity over the samples in view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// Root mean square.
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub rms: f64,
-    /// 99.9th percentile: of several frames, the largest of any frame.
+    /// 99.9th percentile; over several frames, the largest one of any frame.
     #[serde(with = "extended")]
     #[schemars(with = "Extended")]
     pub p999: f64,
@@ -27,23 +28,25 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// The same in a unit of the given size.
+    /// Divides all values by a unit.
     pub fn in_units_of(&self, unit: f64) -> Summary {
         Summary { rms: self.rms / unit, p999: self.p999 / unit, max: self.max / unit }
     }
 }
 
-/// A quantity over several frames.
+/// Statistics of a quantity over several frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pool {
+    /// Number of samples.
     count: u64,
+    /// Sum of squares.
     squares: f64,
     p999: f64,
     max: f64,
 }
 
 impl Pool {
-    /// Adds a frame's summary of `count` samples.
+    /// Adds the summary of a frame with `count` samples.
     pub fn add(&mut self, count: u64, frame: &Summary) {
         self.count += count;
         if count > 0 {
@@ -53,12 +56,12 @@ impl Pool {
         self.max = self.max.max(frame.max);
     }
 
-    /// True before the first sample.
+    /// Returns true if no samples were added.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Returns the root mean square over all samples, and the largest of the frames' percentiles and maxima.
+    /// Returns the root mean square over all samples, and the largest percentile and maximum of any frame.
     pub fn summary(&self) -> Summary {
         Summary { rms: (self.squares / self.count.max(1) as f64).sqrt(), p999: self.p999, max: self.max }
     }
@@ -67,35 +70,41 @@ impl Pool {
 /// A sample and the point drawn for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Lattice position.
+    /// Column and row of the sample.
     pub sample: [u32; 2],
-    /// The sample's world position.
+    /// World position of the sample, metres.
     pub truth: DVec3,
-    /// The drawn point's world position.
+    /// World position of the drawn point, metres.
     pub drawn: DVec3,
 }
 
-/// Sums one quantity up.
+/// Accumulates the statistics of one quantity.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tally {
+    /// Number of counted values.
     pub count: u64,
+    /// Sum of their squares.
     squares: f64,
-    /// The largest counted values that are not 0, at most `capacity`, as bits: the order of non-negative
-    /// numbers is that of their bits. Enough for the quantile above which `1 / denominator` of them lie.
+    /// Bits of the largest counted values above 0, at most `capacity` of them: enough for the quantile. The bits of
+    /// non-negative numbers have the order of the numbers.
     top: BinaryHeap<Reverse<u64>>,
     capacity: usize,
+    /// The quantile is the value that one in `denominator` values exceeds.
     denominator: u64,
+    /// Largest value, including those not counted.
     pub largest: f64,
+    /// Sample with the largest value.
     pub largest_at: Option<Place>,
 }
 
 impl Tally {
-    /// For at most `samples` values, and the quantile above which one of `denominator` lies.
+    /// Creates an empty tally for at most `samples` values. The quantile is the value that one in `denominator`
+    /// exceeds: 100 for the 99th percentile.
     pub fn new(samples: u64, denominator: u64) -> Self {
         Self { capacity: (samples / denominator) as usize + 1, denominator, ..Self::default() }
     }
 
-    /// A value that is no negative number. One that does not count may be the largest all the same.
+    /// Adds a non-negative value. If `counts` is false, it only affects the maximum.
     pub fn add(&mut self, value: f64, counts: bool, place: Place) {
         if value > self.largest {
             (self.largest, self.largest_at) = (value, Some(place));
@@ -107,6 +116,7 @@ impl Tally {
         }
     }
 
+    /// Adds the bits of a value to the largest ones, if it belongs to them.
     fn keep(&mut self, value: Reverse<u64>) {
         if value.0 != 0 && self.top.len() < self.capacity {
             self.top.push(value);
@@ -117,6 +127,7 @@ impl Tally {
         }
     }
 
+    /// Adds the values of another tally.
     pub fn merge(&mut self, other: Tally) {
         if other.largest > self.largest {
             (self.largest, self.largest_at) = (other.largest, other.largest_at);
@@ -126,17 +137,17 @@ impl Tally {
         other.top.into_iter().for_each(|value| self.keep(value));
     }
 
-    /// Root of the mean square.
+    /// Returns the root mean square; 0 without values.
     pub fn rms(&self) -> f64 {
         (self.squares / self.count.max(1) as f64).sqrt()
     }
 
-    /// The smallest value that all but one of `denominator` counted ones do not exceed.
+    /// Returns the quantile by nearest rank: at most one in `denominator` counted values exceeds it.
     pub fn quantile(&self) -> f64 {
         self.quantile_above(self.denominator)
     }
 
-    /// As [`Self::quantile`] with another denominator, not below its own.
+    /// Returns the quantile for another denominator, which must not be smaller than the tally's own.
     pub fn quantile_above(&self, denominator: u64) -> f64 {
         debug_assert!(denominator >= self.denominator);
         let mut top: Vec<u64> = self.top.iter().map(|value| value.0).collect();
@@ -144,7 +155,7 @@ impl Tally {
         top.get((self.count / denominator) as usize).map_or(0.0, |&bits| f64::from_bits(bits))
     }
 
-    /// With the quantile as 99.9th percentile.
+    /// Returns the summary of a tally with the denominator 1000, whose quantile is the 99.9th percentile.
     pub fn summary(&self) -> Summary {
         debug_assert_eq!(self.denominator, 1000);
         Summary { rms: self.rms(), p999: self.quantile(), max: self.largest }

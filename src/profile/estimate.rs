@@ -1,24 +1,25 @@
-//! A median and how well the frames that were measured know it.
+//! Medians with distribution-free confidence intervals.
 
 use serde::{Deserialize, Serialize};
 
-/// The least share of samples whose interval holds the true median.
+/// Smallest probability that the interval contains the true median.
 const CONFIDENCE: f64 = 0.95;
 
-/// A median and its 95 % interval.
+/// A median and its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Median.
     pub median: f64,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Estimate {
-    /// Of these values, at most a thousand; zeros if there is none. The interval lies between two of the values:
-    /// free of any distribution, exact by the binomial (Thompson 1936), and the whole range below six values.
+    /// Computes the median of at most 1000 values; zeros without values. The ends of the interval are two of the
+    /// values, whose ranks follow from the binomial distribution (Thompson 1936). They hold for any distribution. Below
+    /// six values the interval is the whole range.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -31,20 +32,20 @@ impl Estimate {
         Self { median, low: sorted[inward], high: sorted[n - 1 - inward] }
     }
 
-    /// Rounded to thousandths, nanoseconds of a time in microseconds.
+    /// Rounds all numbers to thousandths: times in microseconds to nanoseconds.
     pub fn rounded(self) -> Self {
         let Self { median, low, high } = self;
         Self { median: rounded(median), low: rounded(low), high: rounded(high) }
     }
 }
 
-/// Rounded to thousandths.
+/// Rounds a number to thousandths.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// Returns the number of values to drop at either end of `n` sorted ones for a 95 % interval of the median: in at most
-/// 2.5 % of all samples, chance puts more of them on one side of the median.
+/// Returns the number of values to drop at either end of `n` sorted ones to get the 95 % interval of the median: the
+/// largest k for which at most k of n values lie below the median with a probability of at most 2.5 %, or 0.
 fn cut(n: usize) -> usize {
     let mut chance = 0.5f64.powi(n as i32);
     let mut beyond = chance;

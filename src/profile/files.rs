@@ -1,4 +1,4 @@
-//! The files of a profile: tables, one document, and the trace. Each is whole or not there.
+//! Writes the files of a profile: tables, one document, and the trace. Each file appears only once it is complete.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,23 +10,29 @@ use super::rows::Profile;
 use crate::height::Error;
 use crate::height::save::{Out, replace};
 
-/// The trace.
+/// File with the timeline of one frame.
 pub const TRACE: &str = "trace.json";
-/// Everything as one document.
+/// File with all results as one document.
 pub const DOCUMENT: &str = "profile.json";
-/// A line a pass.
+/// Table with one line per pass.
 pub const PASSES: &str = "passes.csv";
-/// A line a draw.
+/// Table with one line per draw.
 pub const DRAWS: &str = "draws.csv";
-/// A line a mode.
+/// Table with one line per submission mode.
 pub const MODES: &str = "modes.csv";
 
-/// Makes the folder that files go to.
+/// Creates the folder for the files.
+///
+/// # Errors
+/// If the folder cannot be created.
 pub fn make_folder(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::new(folder.display().to_string(), "folder", error))
 }
 
 /// Writes tables, document and trace into a folder.
+///
+/// # Errors
+/// If a file cannot be written.
 pub fn write(folder: &Path, profile: &Profile, document: &impl Serialize, trace: &Value) -> Result<(), Error> {
     save(folder, PASSES, |out| csv(out, &profile.passes))?;
     save(folder, DRAWS, |out| csv(out, &profile.draws))?;

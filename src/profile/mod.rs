@@ -1,7 +1,7 @@
-//! Profile of a frame: device time and shader invocations of every pass, pipeline and draw, with the host's steps on the
-//! same time line, and a comparison of submission modes for the same terrain.
+//! Profile of a frame: device time and shader invocations of every pass and draw, and the host's steps on the same
+//! timeline. Also compares ways to submit the same draws.
 //!
-//! [`run()`] measures. All other modules turn its results into rows, a table and a trace, and need no device.
+//! [`run()`] measures on a device. The other modules turn its results into rows, text tables and a trace.
 
 pub mod estimate;
 pub mod files;

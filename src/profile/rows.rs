@@ -1,19 +1,22 @@
-//! The rows of a profile: `passes.csv`, `draws.csv`, `modes.csv`, and together `profile.json`.
+//! The rows of a profile: the lines of `passes.csv`, `draws.csv` and `modes.csv`, and the parts of `profile.json`.
 //!
-//! Times are microseconds, medians over the frames with their 95 % intervals. Counts that a device cannot take are
-//! left empty.
+//! Times are in microseconds. They are medians over the measured frames, with 95 % confidence intervals. Counts are
+//! empty if the device has no pipeline statistics.
+//!
+//! Frames are measured in two ways. *Probed* frames have queries around every draw, which slow them down. *Plain*
+//! frames have none.
 
 use serde::{Deserialize, Serialize};
 
 use super::estimate::Estimate;
 
-/// Version of the rows. It grows when a reader of the old ones would misread the new ones.
+/// Version of the rows. It increases with changes that readers of older versions would misunderstand.
 pub const SCHEMA: u32 = 1;
 
-/// A step of the host, in the frames whose draws were measured one by one.
+/// A step of the host in probed frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepRow {
-    /// select, upload, record, submit or wait.
+    /// `select`, `upload`, `record`, `submit` or `wait`.
     pub step: String,
     /// Host time.
     pub cpu_us: f64,
@@ -23,138 +26,139 @@ pub struct StepRow {
     pub cpu_us_high: f64,
 }
 
-/// A pass on the device, in the frames whose draws were measured one by one.
+/// A pass on the device in probed frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PassRow {
-    /// Its label.
+    /// Name of the pass.
     pub pass: String,
-    /// Device time; where two passes overlap, it belongs to the earlier one.
+    /// Device time. Where two passes overlap, the time counts for the earlier one.
     pub gpu_us: f64,
     /// Lower end of its interval.
     pub gpu_us_low: f64,
     /// Upper end of its interval.
     pub gpu_us_high: f64,
-    /// Rows of `draws.csv` in it.
+    /// Number of rows of `draws.csv` that belong to this pass. The counts below are their sums.
     pub draws: usize,
-    /// Vertex programs run by those.
-    pub vertices_run: Option<u64>,
-    /// Primitives of those that reached clipping.
-    pub clipping_invocations: Option<u64>,
-    /// Primitives that clipping let through or made.
-    pub clipping_primitives: Option<u64>,
-    /// Fragment programs run by those.
-    pub fragments_run: Option<u64>,
-}
-
-/// A draw on the device, or the rest of a pipeline's draws beyond the number that has queries of their own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DrawRow {
-    /// Its label: technique, pipeline, levels, batch.
-    pub label: String,
-    /// The pass it is in.
-    pub pass: String,
-    /// Vertex source and topology.
-    pub pipeline: String,
-    /// Its number in the list: what the colour `batch` shows; of the first, if it is several.
-    pub batch: usize,
-    /// Draws of the list in it: 1, or the rest.
-    pub draws: usize,
-    /// Finest level among its instances.
-    pub level_min: Option<u32>,
-    /// Coarsest level among its instances.
-    pub level_max: Option<u32>,
-    /// Instances.
-    pub instances: u64,
-    /// Vertices submitted: indices of all instances.
-    pub vertices: u64,
-    /// Triangles submitted, degenerate ones included.
-    pub triangles: u64,
-    /// Device time from the end of all before it to its own end.
-    pub gpu_us: f64,
-    /// Lower end of its interval.
-    pub gpu_us_low: f64,
-    /// Upper end of its interval.
-    pub gpu_us_high: f64,
-    /// Vertex programs run.
+    /// Vertex shader invocations.
     pub vertices_run: Option<u64>,
     /// Primitives that reached clipping.
     pub clipping_invocations: Option<u64>,
-    /// Primitives that clipping let through or made.
+    /// Primitives that left clipping: those kept, and those made by cutting.
     pub clipping_primitives: Option<u64>,
-    /// Fragment programs run.
+    /// Fragment shader invocations.
     pub fragments_run: Option<u64>,
 }
 
-/// A way to submit the land, in plain frames: without queries around draws.
+/// A draw on the device in probed frames. Beyond a number of draws with queries of their own, the remaining draws of a
+/// pipeline share one row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DrawRow {
+    /// Technique, pipeline, levels and batch.
+    pub label: String,
+    /// Name of the pass.
+    pub pass: String,
+    /// Vertex source and topology.
+    pub pipeline: String,
+    /// Number of the first draw in the draw list, from 0. `--colour batch` shows it.
+    pub batch: usize,
+    /// Number of draws of the draw list in this row.
+    pub draws: usize,
+    /// Finest level among the instances; 0 is the finest of all.
+    pub level_min: Option<u32>,
+    /// Coarsest level among the instances.
+    pub level_max: Option<u32>,
+    /// Number of instances.
+    pub instances: u64,
+    /// Vertices submitted: number of indices, times instances.
+    pub vertices: u64,
+    /// Triangles submitted, degenerate ones included.
+    pub triangles: u64,
+    /// Device time from the end of all earlier draws to the end of this one.
+    pub gpu_us: f64,
+    /// Lower end of its interval.
+    pub gpu_us_low: f64,
+    /// Upper end of its interval.
+    pub gpu_us_high: f64,
+    /// Vertex shader invocations.
+    pub vertices_run: Option<u64>,
+    /// Primitives that reached clipping.
+    pub clipping_invocations: Option<u64>,
+    /// Primitives that left clipping: those kept, and those made by cutting.
+    pub clipping_primitives: Option<u64>,
+    /// Fragment shader invocations.
+    pub fragments_run: Option<u64>,
+}
+
+/// A submission mode: a variant of the technique and a way to submit its draws. Measured in plain frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModeRow {
-    /// Technique, or technique:variant.
+    /// `technique` or `technique:variant`.
     pub form: String,
-    /// direct: a recorded call a draw; indirect: one call a pipeline.
+    /// `direct`: one recorded command per draw. `indirect`: one per pipeline. `driven`: the device selects the draws.
     pub submission: String,
-    /// Calls that the host records.
+    /// Draw commands that the host records.
     pub commands: usize,
-    /// Draws of the list.
+    /// Draws in the draw list.
     pub draws: usize,
     /// Triangles submitted, degenerate ones included.
     pub triangles: u64,
-    /// Host time of selection.
+    /// Host time of selecting the level of detail.
     pub select_us: f64,
-    /// Host time of writing the frame's data, indirect commands among it.
+    /// Host time of writing the frame's data for the device, indirect commands included.
     pub upload_us: f64,
-    /// Host time of recording.
+    /// Host time of recording commands.
     pub record_us: f64,
     /// Lower end of its interval.
     pub record_us_low: f64,
     /// Upper end of its interval.
     pub record_us_high: f64,
-    /// Host time of recording over draws.
+    /// Recording time divided by the number of draws.
     pub record_us_per_draw: f64,
-    /// Host time of recording over that of the first mode, frame by frame.
+    /// Recording time divided by that of the first mode, frame by frame.
     pub record_ratio: f64,
     /// Lower end of its interval.
     pub record_ratio_low: f64,
     /// Upper end of its interval.
     pub record_ratio_high: f64,
-    /// Device time.
+    /// Device time of all passes.
     pub gpu_us: f64,
     /// Lower end of its interval.
     pub gpu_us_low: f64,
     /// Upper end of its interval.
     pub gpu_us_high: f64,
-    /// Device time over draws.
+    /// Device time divided by the number of draws.
     pub gpu_us_per_draw: f64,
-    /// Device time over that of the first mode, frame by frame.
+    /// Device time divided by that of the first mode, frame by frame.
     pub gpu_ratio: f64,
     /// Lower end of its interval.
     pub gpu_ratio_low: f64,
     /// Upper end of its interval.
     pub gpu_ratio_high: f64,
-    /// From the start of selection until the device has finished.
+    /// Frame time, from the start of selection until the device has finished.
     pub frame_us: f64,
 }
 
-/// Everything measured, as rows.
+/// All rows of a profile.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
-    /// Frames behind each median.
+    /// Number of frames behind each median.
     pub frames: u32,
     /// Relation of the device's clock to the host's: `calibrated`, or `aligned, not calibrated`.
     pub clock: String,
-    /// Microseconds by which the device's times in the trace may be shifted against the host's.
+    /// Largest error of the device's times against the host's in the trace.
     pub clock_deviation_us: f64,
-    /// The host's steps.
+    /// Steps of the host.
     pub steps: Vec<StepRow>,
-    /// The passes.
+    /// Passes on the device.
     pub passes: Vec<PassRow>,
-    /// The draws.
+    /// Draws on the device.
     pub draws: Vec<DrawRow>,
-    /// Ways to submit the same land.
+    /// Submission modes of the same view.
     pub modes: Vec<ModeRow>,
 }
 
 impl StepRow {
-    /// A step with its time.
+    /// Makes the row of a step.
     pub fn new(step: &str, cpu_us: Estimate) -> Self {
         let Estimate { median, low, high } = cpu_us.rounded();
         Self { step: step.to_string(), cpu_us: median, cpu_us_low: low, cpu_us_high: high }
@@ -162,7 +166,7 @@ impl StepRow {
 }
 
 impl PassRow {
-    /// A pass with its time and the draws in it.
+    /// Makes the row of a pass, with the sums over those of `draws` that belong to it.
     pub fn new(pass: &str, gpu_us: Estimate, draws: &[DrawRow]) -> Self {
         let own: Vec<_> = draws.iter().filter(|draw| draw.pass == pass).collect();
         let sum = |of: fn(&DrawRow) -> Option<u64>| {

@@ -1,4 +1,5 @@
-//! The measuring: in every round one frame with queries around its draws, and a plain frame in every mode.
+//! Measures a profile. Each round draws one frame with queries around every draw, and one plain frame per submission
+//! mode.
 
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};
@@ -14,31 +15,33 @@ use crate::scene::probed::{self, ProbedDraw, ProbedFrame, Span};
 use crate::scene::{Copy, Scene, SceneRenderer, Times};
 use crate::view::View;
 
-/// Rounds that are not counted: caches fill, clocks rise.
+/// First rounds that are not counted, while caches fill and clock rates rise.
 const WARM_UP: u32 = 2;
 
-/// A technique, or a variant of it.
+/// A prepared technique, or a variant of it.
 pub struct Form {
-    /// Its name on the command line.
+    /// `technique` or `technique:variant`, as on the command line.
     pub name: String,
     /// The technique.
     pub technique: Box<dyn Technique>,
 }
 
-/// Measurements, and the means to capture more.
+/// Results of a profile, and the renderers to draw its modes again.
 pub struct Measured {
     /// The rows.
     pub profile: Profile,
-    /// The frame with the median device time as a trace.
+    /// Trace of the frame with the median device time.
     pub trace: Value,
     forms: Vec<Form>,
-    stages: Vec<SceneRenderer>,
+    /// One renderer per form.
+    renderers: Vec<SceneRenderer>,
     modes: Vec<Mode>,
     view: View,
 }
 
-/// A form submitted in one way, and what was drawn so.
+/// A form under one kind of submission, with its counts and times.
 struct Mode {
+    /// Number of the form.
     form: usize,
     submission: Submission,
     commands: usize,
@@ -47,11 +50,11 @@ struct Mode {
     times: Vec<Times>,
 }
 
-/// Measures the first form draw by draw, and all forms under direct and indirect submission, `frames` times in
-/// turn. The scene is planned without morphing. `progress` hears the number of rounds done and to do.
+/// Measures the first form draw by draw, and every form under two kinds of submission, in `frames` alternating rounds.
+/// `progress` is called with the number of finished rounds and of all rounds, warm-up included.
 ///
 /// # Errors
-/// If the device fails, has no timestamps, or a technique draws another list for the same view.
+/// If the device fails or has no timestamps, or the technique returns different lists for the same view.
 pub fn run(
     scene: &Scene,
     view: &View,
@@ -59,22 +62,22 @@ pub fn run(
     frames: u32,
     progress: impl Fn(u32, u32),
 ) -> Result<Measured> {
-    let mut stages = forms.iter().map(|form| renderer(scene, form, view)).collect::<Result<Vec<_>>>()?;
+    let mut renderers = forms.iter().map(|form| renderer(scene, form, view)).collect::<Result<Vec<_>>>()?;
     let mut modes = Vec::new();
-    for (k, (form, renderer)) in forms.iter_mut().zip(&mut stages).enumerate() {
+    for (k, (form, renderer)) in forms.iter_mut().zip(&mut renderers).enumerate() {
         modes.extend(both_ways(k, form, renderer, view)?);
     }
     let mut probed = Vec::new();
     for round in 0..WARM_UP + frames {
         progress(round, WARM_UP + frames);
-        stages[0].submission = None;
+        renderers[0].submission = None;
         let Form { name, technique } = &mut forms[0];
-        let frame = stages[0].draw_probed(technique.as_mut(), name, view)?;
-        // Each mode is the first in its turn.
+        let frame = renderers[0].draw_probed(technique.as_mut(), name, view)?;
+        // The order rotates, so that no mode always follows the probed frame.
         let turn = round as usize % modes.len();
         for k in (turn..modes.len()).chain(0..turn) {
             let mode = &mut modes[k];
-            let renderer = &mut stages[mode.form];
+            let renderer = &mut renderers[mode.form];
             renderer.submission = Some(mode.submission);
             let times = renderer.draw(forms[mode.form].technique.as_mut(), view, Copy::Nothing)?;
             let list = &renderer.list;
@@ -87,38 +90,42 @@ pub fn run(
             probed.push(frame);
         }
     }
-    stages[0].complete()?;
-    let (profile, trace) = summary(&stages[0].list, probed, &modes, &forms)?;
-    Ok(Measured { profile, trace, forms, stages, modes, view: *view })
+    renderers[0].complete()?;
+    let (profile, trace) = summary(&renderers[0].list, probed, &modes, &forms)?;
+    Ok(Measured { profile, trace, forms, renderers, modes, view: *view })
 }
 
+/// Makes a renderer with the pipelines that a form requires.
 fn renderer(scene: &Scene, form: &Form, view: &View) -> Result<SceneRenderer> {
     let plan = scene.plan.clone().with_requirements(form.technique.pipeline_requirements());
     Scene { plan: &plan, ..scene.clone() }.renderer(form.technique.as_ref(), view.size)
 }
 
-/// The modes of a form, its own submission first.
+/// Returns the modes of a form: the submission that it chooses itself, and indirect submission, or direct if it is
+/// already indirect.
 fn both_ways(k: usize, form: &mut Form, renderer: &mut SceneRenderer, view: &View) -> Result<[Mode; 2]> {
     renderer.draw(form.technique.as_mut(), view, Copy::Nothing)?;
     let own = renderer.list.submission;
-    // The host selects for the other one.
+    // For a GPU-driven form, the host selects in the other mode.
     let other = if own == Submission::Indirect { Submission::Direct } else { Submission::Indirect };
     let mode = |submission| Mode { form: k, submission, commands: 0, draws: 0, triangles: 0, times: Vec::new() };
     Ok([own, other].map(mode))
 }
 
 impl Measured {
-    /// The rows and the trace; what is on the device is given up.
+    /// Returns the rows and the trace, and frees the renderers.
     pub fn finish(self) -> (Profile, Value) {
         (self.profile, self.trace)
     }
 
-    /// Draws the mode whose frames took longest once more within a capture of RenderDoc's, and says to which file
-    /// and which mode.
+    /// Captures a frame of the slowest mode with RenderDoc. Returns the capture's file and the name of the mode.
+    ///
+    /// # Errors
+    /// If drawing or the capture fails.
     pub fn capture_worst(&mut self, renderdoc: &RenderDoc) -> Result<(std::path::PathBuf, String)> {
         let rows = self.profile.modes.iter().zip(&self.modes);
         let (row, mode) = rows.max_by(|a, b| a.0.frame_us.total_cmp(&b.0.frame_us)).expect("a form has two modes");
-        let renderer = &mut self.stages[mode.form];
+        let renderer = &mut self.renderers[mode.form];
         renderer.submission = Some(mode.submission);
         let technique = self.forms[mode.form].technique.as_mut();
         let (_, path) = renderdoc.capture(|| renderer.draw(technique, &self.view, Copy::Nothing))?;
@@ -126,11 +133,11 @@ impl Measured {
     }
 }
 
-/// Rows and trace; `list` is that of all probed frames.
+/// Summarises all frames as rows and a trace. `list` is the draw list of all probed frames.
 fn summary(list: &DrawList, mut probed: Vec<ProbedFrame>, modes: &[Mode], forms: &[Form]) -> Result<(Profile, Value)> {
     for frame in &probed {
         let same = frame.draws.iter().map(|d| &d.piece).eq(probed[0].draws.iter().map(|d| &d.piece));
-        ensure!(same, "{}: draws another list for the same view", forms[0].name);
+        ensure!(same, "{}: the technique draws different lists for the same view", forms[0].name);
     }
     let draws: Vec<_> = (0..probed[0].draws.len()).map(|k| draw_row(list, &probed, k)).collect();
     let names = probed[0].passes.iter().map(|(pass, _)| *pass);
@@ -155,6 +162,7 @@ fn summary(list: &DrawList, mut probed: Vec<ProbedFrame>, modes: &[Mode], forms:
     Ok((Profile { frames, clock, clock_deviation_us, steps, passes, draws, modes }, trace))
 }
 
+/// Makes the row of the `k`-th measured piece of the draw list.
 fn draw_row(list: &DrawList, probed: &[ProbedFrame], k: usize) -> DrawRow {
     let ProbedDraw { piece, counts, .. } = &probed[0].draws[k];
     let draws = &list.draws[piece.draws.clone()];
@@ -190,6 +198,7 @@ fn submission_name(submission: Submission) -> &'static str {
     }
 }
 
+/// Makes the row of a mode; ratios are relative to `base`.
 fn mode_row(mode: &Mode, base: &Mode, form: &str) -> ModeRow {
     let us = |of: fn(&Times) -> f64| Estimate::of(mode.times.iter().map(|t| 1e3 * of(t))).rounded();
     let ratio = |of: fn(&Times) -> f64| {

@@ -1,13 +1,13 @@
-//! A profile as tables of text for a terminal.
+//! Formats a profile as text tables for the terminal.
 
 use std::fmt::Write;
 
 use super::rows::{DrawRow, Profile};
 
-/// Draws that are printed, the dearest first; the others are in `draws.csv`.
+/// Largest number of draws that are printed, the most expensive first. `draws.csv` has all of them.
 const SHOWN: usize = 20;
 
-/// All tables.
+/// Returns all tables.
 pub fn text(profile: &Profile) -> String {
     let mut text = steps(profile);
     for part in [passes(profile), draws(profile), modes(profile)] {
@@ -25,7 +25,7 @@ fn steps(profile: &Profile) -> String {
 }
 
 fn passes(profile: &Profile) -> String {
-    let heads = ["pass", "GPU µs", "interval", "draws", "vertices run", "clipped", "primitives", "fragments run"];
+    let heads = ["pass", "GPU µs", "interval", "draws", "vertices run", "clipping in", "clipping out", "fragments run"];
     let rows = profile.passes.iter().map(|pass| {
         let mut cells = vec![pass.pass.clone(), time(pass.gpu_us), interval(pass.gpu_us_low, pass.gpu_us_high)];
         cells.push(pass.draws.to_string());
@@ -37,11 +37,20 @@ fn passes(profile: &Profile) -> String {
 }
 
 fn draws(profile: &Profile) -> String {
-    let mut dearest: Vec<&DrawRow> = profile.draws.iter().collect();
-    dearest.sort_by(|a, b| b.gpu_us.total_cmp(&a.gpu_us));
-    let heads =
-        ["draw", "GPU µs", "interval", "instances", "vertices", "vertices run", "clipped", "primitives", "fragments"];
-    let rows = dearest.iter().take(SHOWN).map(|draw| {
+    let mut slowest: Vec<&DrawRow> = profile.draws.iter().collect();
+    slowest.sort_by(|a, b| b.gpu_us.total_cmp(&a.gpu_us));
+    let heads = [
+        "draw",
+        "GPU µs",
+        "interval",
+        "instances",
+        "vertices",
+        "vertices run",
+        "clipping in",
+        "clipping out",
+        "fragments run",
+    ];
+    let rows = slowest.iter().take(SHOWN).map(|draw| {
         let mut cells = vec![draw.label.clone(), time(draw.gpu_us), interval(draw.gpu_us_low, draw.gpu_us_high)];
         cells.extend([draw.instances, draw.vertices].map(|n| n.to_string()));
         let counts = [draw.vertices_run, draw.clipping_invocations, draw.clipping_primitives, draw.fragments_run];
@@ -49,8 +58,8 @@ fn draws(profile: &Profile) -> String {
         cells
     });
     let mut text = table(&heads, rows);
-    if dearest.len() > SHOWN {
-        let _ = writeln!(text, "and {} cheaper ones", dearest.len() - SHOWN);
+    if slowest.len() > SHOWN {
+        let _ = writeln!(text, "and {} faster draws, see draws.csv", slowest.len() - SHOWN);
     }
     text
 }
@@ -58,16 +67,16 @@ fn draws(profile: &Profile) -> String {
 fn modes(profile: &Profile) -> String {
     let heads = [
         "mode",
-        "calls",
+        "commands",
         "draws",
         "triangles",
         "record µs",
         "interval",
-        "a draw",
+        "per draw",
         "ratio",
         "GPU µs",
         "interval",
-        "a draw",
+        "per draw",
         "ratio",
     ];
     let rows = profile.modes.iter().map(|mode| {
@@ -101,7 +110,7 @@ fn count(count: Option<u64>) -> String {
     count.map_or("–".to_string(), |n| n.to_string())
 }
 
-/// Columns as wide as their widest cell, the first to the left and the others to the right.
+/// Formats a table. The first column is aligned to the left, the others to the right.
 fn table(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut lines = vec![heads.iter().map(|head| head.to_string()).collect::<Vec<_>>()];
     lines.extend(rows);
@@ -125,9 +134,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_shown_is_said() {
+    fn a_short_table_mentions_no_further_draws() {
         let text = text(&Profile { frames: 7, clock: "calibrated".to_string(), ..Profile::default() });
         assert!(text.ends_with("medians of 7 frames, 95 % intervals; clock calibrated\n"), "{text}");
-        assert!(!text.contains("cheaper"), "{text}");
+        assert!(!text.contains("faster draws"), "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! One probed frame as tracks and counters of a trace.
+//! Converts one probed frame to the tracks and counters of a trace.
 
 use serde_json::{Map, Value, json};
 
@@ -6,7 +6,8 @@ use super::rows::DrawRow;
 use super::trace::{Counter, Slice, Track};
 use crate::scene::probed::{ProbedFrame, Span};
 
-/// The host's track, and the device's: passes, in them pipelines, in them draws.
+/// Returns the tracks of host and device. The device's passes contain pipelines, which contain draws. `rows` are those
+/// of the frame's draws.
 pub fn tracks(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Track> {
     let host = frame.steps.iter().map(|(step, span)| slice(step, "step", *span, Map::new())).collect();
     let mut device = Vec::new();
@@ -20,7 +21,8 @@ pub fn tracks(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Track> {
     vec![Track { name: "CPU".to_string(), slices: host }, Track { name: "GPU".to_string(), slices: device }]
 }
 
-/// Running totals at the end of each draw.
+/// Returns running totals over the frame, with one sample at the end of each draw: triangles, vertex shader invocations
+/// and fragment shader invocations. Those that the device does not count are left out.
 pub fn counters(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Counter> {
     let running = |name, of: fn(&DrawRow) -> Option<u64>| {
         let mut sum = 0;
@@ -36,10 +38,11 @@ pub fn counters(frame: &ProbedFrame, rows: &[DrawRow]) -> Vec<Counter> {
         running("vertices run", |row| row.vertices_run),
         running("fragments run", |row| row.fragments_run),
     ];
-    // A counter that no draw has was not counted.
+    // A counter with its start alone has no counts.
     counters.into_iter().filter(|counter| counter.samples.len() > 1).collect()
 }
 
+/// Returns the slices of consecutive draws: one per run of draws with the same pipeline, followed by its draws.
 fn pipelines(draws: &[(Span, &DrawRow)]) -> Vec<Slice> {
     let mut slices = Vec::new();
     for run in draws.chunk_by(|a, b| a.1.pipeline == b.1.pipeline) {
@@ -51,7 +54,7 @@ fn pipelines(draws: &[(Span, &DrawRow)]) -> Vec<Slice> {
     slices
 }
 
-/// Returns the values of a draw's row other than label and times.
+/// Returns the values of a draw's row other than label and times, to show when it is selected.
 fn args_of(row: &DrawRow) -> Map<String, Value> {
     let Ok(Value::Object(fields)) = serde_json::to_value(row) else { return Map::new() };
     let shown = |name: &str, value: &Value| name != "label" && !name.starts_with("gpu_us") && !value.is_null();

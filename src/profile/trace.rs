@@ -1,49 +1,49 @@
-//! A timeline in the Trace Event Format, which Perfetto and Chrome's tracing page open.
+//! Writes a timeline in the Trace Event Format, for Perfetto or Chrome's `about:tracing`.
 //!
-//! After "Trace Event Format" (Google, 2016): the JSON object form, with metadata (`M`), complete (`X`) and counter
-//! (`C`) events; times in microseconds. Slices of a track lie side by side or one within the other.
+//! The document has the JSON object form of "Trace Event Format" (Google, 2016) with metadata (`M`), complete (`X`) and
+//! counter (`C`) events. Times are in microseconds. Slices of a track must be disjoint or nested.
 
 use serde_json::{Map, Value, json};
 
 use super::estimate::rounded;
 
-/// The one process of a trace.
+/// Process number of all events.
 const PROCESS: u32 = 1;
 
-/// A stretch of time on a track.
+/// A time span on a track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// Events of the track.
+    /// Name to show.
     pub name: String,
-    /// Category: step, pass, pipeline or draw.
+    /// Category: `step`, `pass`, `pipeline` or `draw`.
     pub category: &'static str,
     /// Start, microseconds.
     pub start_us: f64,
     /// End, microseconds.
     pub end_us: f64,
-    /// Details shown when it is selected.
+    /// Details to show when the slice is selected.
     pub args: Map<String, Value>,
 }
 
-/// Slices of one thread of work.
+/// The slices of the host or of the device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Its name.
+    /// Name to show.
     pub name: String,
-    /// Its slices; one that encloses others stands before them.
+    /// The slices. A slice precedes those nested in it.
     pub slices: Vec<Slice>,
 }
 
-/// A number over time.
+/// A number that changes over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Counter {
-    /// Its name.
+    /// Name to show.
     pub name: &'static str,
-    /// Microseconds, and the value from then on.
+    /// Times, microseconds, and the value from each time on.
     pub samples: Vec<(f64, u64)>,
 }
 
-/// The whole trace as one JSON document; `facts` are said of it as a whole.
+/// Returns the trace as one JSON document. `facts` describe the trace as a whole.
 pub fn document(tracks: &[Track], counters: &[Counter], facts: Value) -> Value {
     let mut events = vec![metadata("process_name", 0, json!({ "name": "cuesta" }))];
     for (thread, track) in (1..).zip(tracks) {
@@ -60,7 +60,7 @@ fn metadata(name: &str, thread: u32, args: Value) -> Value {
 }
 
 fn complete(thread: u32, slice: &Slice) -> Value {
-    // Both ends are rounded before they are subtracted: neighbours stay neighbours.
+    // Rounding the ends, not the duration, keeps adjacent slices adjacent.
     let (start, end) = (rounded(slice.start_us), rounded(slice.end_us));
     json!({
         "ph": "X",

@@ -1,27 +1,27 @@
-//! An axis: from values to places on a line, and the ticks between its ends.
+//! Axes of charts: the range of values that an axis covers, the position of a value on it, and its ticks.
 
 /// Placement of values on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Equal steps for equal differences; begins at 0.
+    /// Linear, starting at 0.
     Linear,
-    /// Equal steps for equal factors.
+    /// Logarithmic, for positive values.
     Logarithmic,
 }
 
-/// Decades that a logarithmic axis shows at most; smaller values stand on its lower end.
+/// Largest number of decades on a logarithmic axis. Smaller values are drawn at its lower end.
 const DECADES: f64 = 4.0;
 
-/// One axis of a chart.
+/// Label and scale of an axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Quantity and unit.
     pub label: String,
-    /// True if a logarithmic form exists.
+    /// Scale that the chart has by default.
     pub scale: Scale,
 }
 
-/// An axis with its ends.
+/// The values that an axis covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     scale: Scale,
@@ -30,7 +30,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// The range around all these values.
+    /// Returns a range with round ends that contains all finite values, up to [`DECADES`] below the largest.
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
         let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
         let high = finite.iter().copied().fold(0.0, f64::max);
@@ -49,7 +49,7 @@ impl Range {
         }
     }
 
-    /// Returns the position of a value: 0 at the lower end, 1 at the upper; values beyond are clamped.
+    /// Returns the position of a value: 0 at the lower end, 1 at the upper end. Values outside are clamped.
     pub fn place(&self, value: f64) -> f64 {
         let part = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -58,7 +58,7 @@ impl Range {
         if part.is_nan() { 1.0 } else { part.clamp(0.0, 1.0) }
     }
 
-    /// Values worth a line, from below.
+    /// Returns the round values that get a grid line, in ascending order.
     pub fn ticks(&self) -> Vec<f64> {
         match self.scale {
             Scale::Linear => {
@@ -79,21 +79,23 @@ impl Range {
     }
 }
 
-/// A round step of which between four and eight make the way up to `high`.
+/// Returns the distance of ticks on a linear axis: 1, 2 or 5 times a power of ten, so that it has four to ten steps.
 fn step(high: f64) -> f64 {
     let rough = high / 4.0;
     let decade = 10f64.powf(rough.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|s| *s <= rough).unwrap_or(decade)
 }
 
-/// Returns the possible ends of a logarithmic axis.
+/// Factors on a power of ten at which a logarithmic axis may end.
 const MARKS: [f64; 8] = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0];
 
+/// Returns the largest possible end that is not above a value.
 fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     MARKS.iter().rev().map(|m| m * decade).find(|v| *v <= value * 1.0001).unwrap_or(decade)
 }
 
+/// Returns the smallest possible end that is not below a value.
 fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     MARKS.iter().map(|m| m * decade).find(|v| *v >= value * 0.9999).unwrap_or(10.0 * decade)

@@ -1,4 +1,4 @@
-//! Bars cut into parts, as SVG: what a frame's time is made of.
+//! Stacked bar charts as SVG. The report shows the parts of the frame time with them.
 
 use std::fmt::Write;
 
@@ -6,47 +6,55 @@ use super::axis::{Range, Scale};
 use super::chart::{WIDTH, style_of_files};
 use super::html::{escape, number};
 
+// Lengths are in SVG user units; a chart is `WIDTH` of them wide.
+
+/// Margins of the plot area.
 const LEFT: f64 = 10.0;
 const RIGHT: f64 = 22.0;
-/// Room a bar takes: a line of text and the bar below it.
-const ROW: f64 = 38.0;
-const BAR: f64 = 14.0;
+/// Height of the legend above the plot area.
+const HEAD: f64 = 22.0;
+/// Height of the tick labels and the axis label below it.
 const FOOT: f64 = 44.0;
+/// Height of a row: the name of the bar, and the bar below it.
+const ROW: f64 = 38.0;
+/// Height of a bar.
+const BAR: f64 = 14.0;
+/// Height of the title of a file.
 const TITLE: f64 = 26.0;
 
-/// Fills of the parts, in order.
+/// Colours of the parts, in order.
 pub const COLOURS: [&str; 5] = ["#e69f00", "#cc79a7", "#009e73", "#0072b2", "#bbbbbb"];
 
-/// Bars of one unit.
+/// A stacked bar chart with a linear axis.
 #[derive(Clone, Debug)]
 pub struct Bars {
-    /// Quantity shown.
+    /// Title.
     pub title: String,
-    /// Reading hint.
+    /// Caption: how to read the chart.
     pub about: String,
-    /// Name and unit of the axis.
+    /// Label of the axis.
     pub label: String,
     /// Names of the parts.
     pub parts: Vec<&'static str>,
-    /// From above.
+    /// The bars from top to bottom.
     pub rows: Vec<Bar>,
 }
 
 /// One bar.
 #[derive(Clone, Debug)]
 pub struct Bar {
-    /// The series it belongs to.
+    /// Name of the series that the bar belongs to. The page's controls hide a series.
     pub series: String,
-    /// Its name.
+    /// Name of the bar.
     pub name: String,
-    /// One value a part.
+    /// One value per part.
     pub values: Vec<f64>,
-    /// A mark across the bar, with its name.
+    /// Value and name of a mark across the bar.
     pub mark: Option<(f64, &'static str)>,
 }
 
 impl Bars {
-    /// For the page.
+    /// Returns the chart as an SVG element of the page, whose style sheet applies.
     pub fn inline(&self) -> String {
         let title = escape(&self.title);
         format!(
@@ -56,7 +64,7 @@ impl Bars {
         )
     }
 
-    /// As a file of its own.
+    /// Returns the chart as an SVG file with its own title and styles.
     pub fn file(&self) -> String {
         let height = TITLE + self.height();
         format!(
@@ -71,19 +79,19 @@ impl Bars {
     }
 
     fn height(&self) -> f64 {
-        ROW * self.rows.len() as f64 + FOOT + 22.0
+        HEAD + ROW * self.rows.len() as f64 + FOOT
     }
 
     fn body(&self) -> String {
         let ends = self.rows.iter().flat_map(|bar| [bar.values.iter().sum(), bar.mark.map_or(0.0, |(v, _)| v)]);
         let range = Range::around(Scale::Linear, ends);
         let x = |value: f64| LEFT + range.place(value) * (WIDTH - LEFT - RIGHT);
-        let bottom = 22.0 + ROW * self.rows.len() as f64;
+        let bottom = HEAD + ROW * self.rows.len() as f64;
         let mut svg = self.legend();
         for tick in range.ticks() {
             let _ = write!(
                 svg,
-                "<path class=\"grid\" d=\"M{0:.1} 22V{bottom:.1}\"/><text x=\"{0:.1}\" y=\"{1:.1}\" text-anchor=\"middle\">{2}</text>",
+                "<path class=\"grid\" d=\"M{0:.1} {HEAD}V{bottom:.1}\"/><text x=\"{0:.1}\" y=\"{1:.1}\" text-anchor=\"middle\">{2}</text>",
                 x(tick),
                 bottom + 16.0,
                 number(tick)
@@ -97,7 +105,7 @@ impl Bars {
             escape(&self.label)
         );
         for (k, bar) in self.rows.iter().enumerate() {
-            svg += &self.bar(bar, 22.0 + ROW * k as f64, &x);
+            svg += &self.bar(bar, HEAD + ROW * k as f64, &x);
         }
         svg
     }
@@ -116,11 +124,12 @@ impl Bars {
         svg
     }
 
+    /// Draws one bar in the row at `top`. `x` maps values to positions.
     fn bar(&self, bar: &Bar, top: f64, x: &dyn Fn(f64) -> f64) -> String {
-        let told: Vec<_> =
+        let parts: Vec<_> =
             self.parts.iter().zip(&bar.values).map(|(part, v)| format!("{part} {}", number(*v))).collect();
         let mark = bar.mark.map_or(String::new(), |(value, name)| format!(", {name} {}", number(value)));
-        let label = escape(&format!("{}: {}{mark}; {}", bar.name, told.join(", "), self.label));
+        let label = escape(&format!("{}: {}{mark}; {}", bar.name, parts.join(", "), self.label));
         let mut svg = format!(
             "<g class=\"bar\" data-series=\"{}\"><text x=\"{LEFT}\" y=\"{:.1}\">{}</text>\
              <g class=\"point\" tabindex=\"0\" role=\"img\" aria-label=\"{label}\" data-x=\"{}\">",
@@ -147,7 +156,7 @@ impl Bars {
     }
 }
 
-/// The style of the parts.
+/// Returns the style sheet of parts and marks.
 pub fn style() -> String {
     let fills = COLOURS.iter().enumerate().map(|(k, colour)| format!(".p{k}{{fill:{colour}}}"));
     fills.collect::<String>() + ".mark{stroke:#000;stroke-width:2}"

@@ -1,26 +1,31 @@
-//! A chart of points as SVG: for the page, where classes give the colours and scripts find the points, and as a file
-//! of its own, which says its title, legend and colours itself.
+//! Scatter charts with lines as SVG: inline for the page, which styles them and makes them interactive, and as
+//! stand-alone files with title, legend and colours.
 
 use std::fmt::Write;
 
 use super::axis::{Axis, Range, Scale};
 use super::html::{escape, number};
 
-/// Size of a chart, chosen so that its text is legible on a telephone and in half a window.
+// Lengths are in SVG user units.
+
+/// Width of a chart. It keeps the text legible on a phone and in half a desktop window.
 pub const WIDTH: f64 = 400.0;
+/// Height of a chart.
 const HEIGHT: f64 = 300.0;
+/// Margins of the plot area.
 const LEFT: f64 = 60.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 48.0;
-/// Room that a file gives to its title, and to each line of the legend.
+/// Height of the title of a file.
 const TITLE: f64 = 26.0;
+/// Height of a line in the legend of a file.
 const LEGEND: f64 = 18.0;
 
-/// Line and marker colours of a file, and of the page in the light (Okabe and Ito 2008, told apart by colour-blind
-/// readers too; yellow is left out, it is too light on white).
+/// Colours of the series on a white background: the palette of Okabe and Ito (2008), which colour-blind readers can
+/// distinguish. Yellow is left out, as it is too light.
 pub const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555"];
-/// The same, told apart by shape.
+/// Markers of the series as SVG paths around (0, 0).
 const MARKERS: [&str; 7] = [
     "M-4.5 0a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0 -9 0z",
     "M-4 -4h8v8h-8z",
@@ -36,70 +41,70 @@ const MARKERS: [&str; 7] = [
 pub struct Chart {
     /// Title.
     pub title: String,
-    /// Reading hint, one sentence.
+    /// Caption: how to read the chart.
     pub about: String,
-    /// To the right.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Upwards.
+    /// Vertical axis.
     pub y: Axis,
-    /// Contents.
+    /// The series of points.
     pub series: Vec<Series>,
-    /// A line through points that belong together across the series.
+    /// Additional dashed line.
     pub guide: Option<Guide>,
-    /// A horizontal line with its name.
+    /// Value and name of a horizontal dashed line.
     pub limit: Option<(f64, String)>,
 }
 
-/// Points of one kind.
+/// Points of one series.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Its name.
+    /// Name of the series.
     pub name: String,
-    /// Number of its colour and marker.
+    /// Number of the style, which determines colour and marker.
     pub style: usize,
-    /// Its points, joined in this order.
+    /// The points, joined by a line in this order.
     pub points: Vec<Point>,
 }
 
 /// One point.
 #[derive(Clone, Debug, Default)]
 pub struct Point {
-    /// To the right.
+    /// Value on the horizontal axis.
     pub x: f64,
-    /// Upwards.
+    /// Value on the vertical axis.
     pub y: f64,
-    /// The interval of y.
+    /// Lower and upper end of a whisker on the vertical axis.
     pub interval: Option<[f64; 2]>,
-    /// Label with its values.
+    /// Text that describes the point, shown on hover.
     pub label: String,
-    /// True if it is marked.
+    /// True if the point gets a ring.
     pub marked: bool,
 }
 
-/// A line of its own.
+/// A dashed line without markers.
 #[derive(Clone, Debug)]
 pub struct Guide {
-    /// Its name.
+    /// Name of the line.
     pub name: String,
-    /// Its points.
+    /// Points (x, y), joined in this order.
     pub points: Vec<[f64; 2]>,
 }
 
-/// Axes of one drawing.
+/// Scales of a drawing's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// As each axis is by itself.
+    /// The default scale of each axis.
     Own,
-    /// All linear.
+    /// Linear axes.
     Linear,
 }
 
-/// The marker of a style: another one whenever the colours begin again.
+/// Returns the marker of a style. When colours repeat, markers are shifted, so that the combination stays unique.
 fn marker(style: usize) -> &'static str {
     MARKERS[(style + style / COLOURS.len()) % MARKERS.len()]
 }
 
-/// The marker of a style, for legends.
+/// Returns the marker of a style as a small SVG element, for the page's controls.
 pub fn swatch(style: usize) -> String {
     let k = style % COLOURS.len();
     format!(
@@ -109,17 +114,17 @@ pub fn swatch(style: usize) -> String {
 }
 
 impl Chart {
-    /// Returns true if there is nothing to draw.
+    /// Returns true if no series has a point.
     pub fn is_empty(&self) -> bool {
         self.series.iter().all(|series| series.points.is_empty())
     }
 
-    /// Returns true if the linear form differs from the default one.
+    /// Returns true if an axis is logarithmic, so that linear axes give another drawing.
     pub fn has_logarithm(&self) -> bool {
         [&self.x, &self.y].iter().any(|axis| axis.scale == Scale::Logarithmic)
     }
 
-    /// For the page.
+    /// Returns the chart as an SVG element of the page, whose style sheet applies.
     pub fn inline(&self, form: Form) -> String {
         let class = if form == Form::Own { "own" } else { "linear" };
         format!(
@@ -129,7 +134,7 @@ impl Chart {
         )
     }
 
-    /// As a file of its own.
+    /// Returns the chart as an SVG file with its own title, legend and styles.
     pub fn file(&self) -> String {
         let names = self.series.iter().map(|s| (s.style, s.name.as_str()));
         let legend: String = names.enumerate().map(|(k, (style, name))| legend_line(k, style, name)).collect();
@@ -173,13 +178,14 @@ impl Chart {
     }
 }
 
-/// The axes of one drawing.
+/// The plot area of a drawing: maps values to positions and draws in it.
 struct PlotArea {
     x: Range,
     y: Range,
 }
 
 impl PlotArea {
+    /// Chooses ranges that contain all points, whiskers and lines of a chart.
     fn of(chart: &Chart, form: Form) -> Self {
         let scale = |axis: &Axis| if form == Form::Own { axis.scale } else { Scale::Linear };
         let guides = chart.guide.iter().flat_map(|guide| guide.points.iter());
@@ -199,12 +205,13 @@ impl PlotArea {
         HEIGHT - BOTTOM - self.y.place(value) * (HEIGHT - TOP - BOTTOM)
     }
 
+    /// Returns the SVG path through some points.
     fn line(&self, points: impl Iterator<Item = (f64, f64)>) -> String {
         let step = |(k, (x, y))| format!("{}{:.1} {:.1}", if k == 0 { 'M' } else { 'L' }, self.x(x), self.y(y));
         points.enumerate().map(step).collect()
     }
 
-    /// Lines, their values and the axes' names.
+    /// Draws grid lines, tick labels, axes and their labels.
     fn grid(&self, chart: &Chart) -> String {
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         let mut svg = String::new();
@@ -273,8 +280,8 @@ impl PlotArea {
     }
 }
 
-/// One line of a file's legend.
-pub fn legend_line(line: usize, style: usize, name: &str) -> String {
+/// Draws a line of the legend of a file, counted from 0.
+fn legend_line(line: usize, style: usize, name: &str) -> String {
     let k = style % COLOURS.len();
     format!(
         "<g class=\"series s{k}\" transform=\"translate(6 {})\"><path d=\"{}\"/><text x=\"12\" y=\"4\">{}</text></g>",
@@ -284,7 +291,7 @@ pub fn legend_line(line: usize, style: usize, name: &str) -> String {
     )
 }
 
-/// Style sheet for a chart in a file of its own.
+/// Returns the style sheet of chart files.
 pub fn style_of_files() -> String {
     let colours = COLOURS.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}"));
     colours.collect::<String>()

@@ -1,4 +1,4 @@
-//! The figures of a report and the results in them.
+//! Chooses the charts of a benchmark's report and fills them with its results.
 
 use crate::bench::Errors;
 use crate::bench::results::{CaseResult, Results};
@@ -9,30 +9,30 @@ use super::bars::{Bar, Bars};
 use super::chart::{Chart, Guide, Point, Series};
 use super::html::{number, slug};
 
-/// All figures of a report.
+/// All charts of a report.
 pub struct Figures {
-    /// Names of the series; the place in the list is the style.
+    /// Names of the series. Their index is the number of their style.
     pub series: Vec<String>,
-    /// Scene by scene.
+    /// Charts of each scene.
     pub scenes: Vec<SceneFigures>,
-    /// Cost against terrain size.
+    /// Frame time against terrain size.
     pub size: Chart,
-    /// Error against the angle off the axis.
+    /// Error against the angle off the view axis.
     pub angle: Chart,
 }
 
-/// The figures of one scene.
+/// The charts of one scene.
 pub struct SceneFigures {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
-    /// Charts with a short name each.
+    /// Charts, each with a short name for its file.
     pub charts: Vec<(&'static str, Chart)>,
-    /// Parts of a frame time.
+    /// Parts of the frame time of each case.
     pub split: Bars,
 }
 
 impl Figures {
-    /// The figures of these results.
+    /// Makes the charts of these results.
     pub fn of(results: &Results) -> Self {
         let mut series = Vec::new();
         let mut scenes: Vec<String> = Vec::new();
@@ -54,7 +54,7 @@ impl Figures {
         Self { series, scenes, size, angle }
     }
 
-    /// Every figure that is not empty as a file: name without extension, and text.
+    /// Returns all charts with contents as SVG files: name without extension, and text.
     pub fn files(&self) -> Vec<(String, String)> {
         let mut files = Vec::new();
         let mut add = |name: String, chart: &Chart| {
@@ -77,7 +77,7 @@ fn axis(label: &str, scale: Scale) -> Axis {
     Axis { label: label.to_string(), scale }
 }
 
-/// Points by series, in the order of their styles.
+/// Groups the points of cases into series, in the order of `names`. Series without points are left out.
 fn grouped<'a>(
     cases: impl Iterator<Item = &'a CaseResult> + Clone,
     names: &[String],
@@ -92,7 +92,8 @@ fn grouped<'a>(
     names.iter().enumerate().map(series).filter(|series| !series.points.is_empty()).collect()
 }
 
-/// Marks the points that no other beats in both values, and joins them.
+/// Marks the points of the Pareto front, those for which no other point is better in one value and not worse in the
+/// other. Returns the line that joins them. Smaller values are better.
 fn pareto(series: &mut [Series]) -> Guide {
     let all: Vec<[f64; 2]> = series.iter().flat_map(|s| s.points.iter().map(|p| [p.x, p.y])).collect();
     let beaten = |p: &Point| all.iter().any(|q| q[0] <= p.x && q[1] <= p.y && (q[0] < p.x || q[1] < p.y));
@@ -108,8 +109,8 @@ fn pareto(series: &mut [Series]) -> Guide {
     Guide { name: "Pareto front".to_string(), points: front }
 }
 
-/// Returns a case and its results in one line.
-fn told(result: &CaseResult) -> String {
+/// Describes a case and its results in one line.
+fn describe(result: &CaseResult) -> String {
     let mut parts = vec![format!("{}, {} px", result.case.series(), number(result.case.tolerance_px))];
     if let Some(errors) = &result.errors {
         let e = errors.error_px;
@@ -152,21 +153,21 @@ impl SceneFigures {
     }
 }
 
+/// Chart of frame time against the largest screen error, with the Pareto front.
 fn error_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[String]) -> Chart {
     let point = |result: &CaseResult| {
         let (time, errors) = (result.time.as_ref()?, result.errors.as_ref()?);
         let frame = time.frame_ms;
         let interval = Some([frame.low, frame.high]);
-        Some(Point { x: errors.error_px.max, y: frame.value, interval, label: told(result), marked: false })
+        Some(Point { x: errors.error_px.max, y: frame.value, interval, label: describe(result), marked: false })
     };
     let mut series = grouped(cases, names, point);
     let guide = Some(pareto(&mut series));
     Chart {
         title: "Error against frame time".to_string(),
-        about:
-            "Left and low is good. Rings and the dashed line: the Pareto front. Whiskers: bootstrap 95 % intervals. \
-                Errors too small for the axis stand on its edge."
-                .to_string(),
+        about: "Lower left is better. Rings and the dashed line mark the Pareto front. Whiskers are bootstrap 95 % \
+                intervals. Errors below the axis are drawn at its edge."
+            .to_string(),
         x: axis("largest screen error, px", Scale::Logarithmic),
         y: axis("median frame time, ms", Scale::Logarithmic),
         series,
@@ -175,16 +176,17 @@ fn error_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[
     }
 }
 
+/// Chart of frame time against the tolerance.
 fn tolerance_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[String]) -> Chart {
     let point = |result: &CaseResult| {
         let frame = result.time.as_ref()?.frame_ms;
         let (x, interval) = (result.case.tolerance_px, Some([frame.low, frame.high]));
-        Some(Point { x, y: frame.value, interval, label: told(result), marked: false })
+        Some(Point { x, y: frame.value, interval, label: describe(result), marked: false })
     };
     Chart {
         title: "Frame time against tolerance".to_string(),
-        about: "What a promise costs, whatever the error then is. Whiskers: bootstrap 95 % intervals.".to_string(),
-        x: axis("error allowed, px", Scale::Logarithmic),
+        about: "Cost of a tolerance; the error may be smaller. Whiskers are bootstrap 95 % intervals.".to_string(),
+        x: axis("tolerance, px", Scale::Logarithmic),
         y: axis("median frame time, ms", Scale::Logarithmic),
         series: grouped(cases, names, point),
         guide: None,
@@ -192,25 +194,25 @@ fn tolerance_time<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names
     }
 }
 
+/// Chart of triangles against the largest screen error.
 fn triangles_error<'a>(cases: impl Iterator<Item = &'a CaseResult> + Clone, names: &[String]) -> Chart {
     let point = |result: &CaseResult| {
         let (time, errors) = (result.time.as_ref()?, result.errors.as_ref()?);
         let (x, y) = (errors.error_px.max, time.triangles);
-        Some(Point { x, y, interval: None, label: told(result), marked: false })
+        Some(Point { x, y, interval: None, label: describe(result), marked: false })
     };
     Chart {
         title: "Triangles against error".to_string(),
-        about: "Mean of a frame. A point's value says how many times the triangles of a near-optimal mesh that is."
-            .to_string(),
+        about: "Mean triangles per frame. The label of a point compares them with a near-optimal mesh.".to_string(),
         x: axis("largest screen error, px", Scale::Logarithmic),
-        y: axis("triangles a frame", Scale::Logarithmic),
+        y: axis("triangles per frame", Scale::Logarithmic),
         series: grouped(cases, names, point),
         guide: None,
         limit: None,
     }
 }
 
-/// Of each series the case whose tolerance is nearest one pixel.
+/// Returns the case of each series whose tolerance is nearest to 1 px by ratio.
 fn typical<'a>(cases: &[&'a CaseResult]) -> Vec<&'a CaseResult> {
     let mut chosen: Vec<&CaseResult> = Vec::new();
     let far = |result: &CaseResult| result.case.tolerance_px.ln().abs();
@@ -224,6 +226,7 @@ fn typical<'a>(cases: &[&'a CaseResult]) -> Vec<&'a CaseResult> {
     chosen
 }
 
+/// Chart of the share of values in each bin of a histogram, one series per case.
 fn histogram(
     cases: &[&CaseResult],
     names: &[String],
@@ -247,7 +250,7 @@ fn histogram(
     };
     Chart {
         title: title.to_string(),
-        about: "Share of each class of sizes, at the tolerance nearest 1 px.".to_string(),
+        about: "Share of the values in each bin, for the tolerance nearest to 1 px.".to_string(),
         x: axis(label, Scale::Logarithmic),
         y: axis("share, %", Scale::Logarithmic),
         series: cases.iter().filter_map(series).collect(),
@@ -256,7 +259,8 @@ fn histogram(
     }
 }
 
-/// A value that stands for a class: the geometric mean of its ends where it has two.
+/// Returns the position of a bin on the axis: the geometric mean of its ends, its lower end if it has no upper one, or
+/// half the upper end if it starts at 0.
 fn middle(bin: &Bin) -> f64 {
     match (bin.from > 0.0, bin.to.is_finite()) {
         (true, true) => (bin.from * bin.to).sqrt(),
@@ -265,6 +269,7 @@ fn middle(bin: &Bin) -> f64 {
     }
 }
 
+/// Chart of the parts of each case's frame time.
 fn split<'a>(cases: impl Iterator<Item = &'a CaseResult>) -> Bars {
     let bar = |result: &CaseResult| {
         let time = result.time.as_ref()?;
@@ -279,15 +284,17 @@ fn split<'a>(cases: impl Iterator<Item = &'a CaseResult>) -> Bars {
         })
     };
     Bars {
-        title: "What frame time is made of".to_string(),
-        about: "Medians. The black mark is shading alone: the same picture from one full-screen pass.".to_string(),
+        title: "Parts of the frame time".to_string(),
+        about: "Medians. The mark is the frame time of the shading-only baseline: one full-screen pass that does the \
+                same fragment work without triangles."
+            .to_string(),
         label: "milliseconds".to_string(),
         parts: vec!["select", "record", "upload", "GPU", "rest"],
         rows: cases.filter_map(bar).collect(),
     }
 }
 
-/// Cost against size, along the path that was flown over the most sizes.
+/// Chart of frame time against terrain size, along the path that was measured over the most sizes.
 fn size(results: &Results, names: &[String]) -> Chart {
     let samples = |result: &CaseResult| result.case.terrain.size.map(f64::from).iter().product::<f64>();
     let sizes = |path: &str| {
@@ -307,7 +314,7 @@ fn size(results: &Results, names: &[String]) -> Chart {
     };
     let cases: Vec<&CaseResult> = scenes.iter().flat_map(of_scene).collect();
     let point = |result: &CaseResult| {
-        let label = format!("{}: {}", result.case.terrain, told(result));
+        let label = format!("{}: {}", result.case.terrain, describe(result));
         let frame = result.time.as_ref()?.frame_ms;
         Some(Point {
             x: samples(result),
@@ -318,8 +325,8 @@ fn size(results: &Results, names: &[String]) -> Chart {
         })
     };
     Chart {
-        title: "Cost against terrain size".to_string(),
-        about: format!("Path {}, at the tolerance nearest 1 px.", path.unwrap_or("of any kind")),
+        title: "Frame time against terrain size".to_string(),
+        about: format!("Path {}, at the tolerance nearest to 1 px.", path.unwrap_or("of any kind")),
         x: axis("samples of the terrain", Scale::Logarithmic),
         y: axis("median frame time, ms", Scale::Logarithmic),
         series: grouped(cases.into_iter(), names, point),
@@ -328,8 +335,10 @@ fn size(results: &Results, names: &[String]) -> Chart {
     }
 }
 
-/// The largest error over the tolerance by angle, over all cases of a series. The guide is what a displacement at an
-/// angle θ off the axis moves more on the screen than Judnich & Ling 2012, eq. 1, says: 1/cos²θ.
+/// Chart of the largest error divided by the tolerance against the angle off the view axis, over all cases of a series.
+///
+/// The guide is 1/cos²θ: the largest factor by which eq. 1 of Judnich and Ling 2012 underestimates a displacement on the
+/// screen at an angle θ off the axis.
 fn angle(results: &Results, names: &[String]) -> Chart {
     let series = |(style, name): (usize, &String)| {
         let own = results.cases.iter().filter(|result| result.case.series() == *name);
@@ -353,14 +362,15 @@ fn angle(results: &Results, names: &[String]) -> Chart {
     let guide = (0..=40).map(|k| widest * f64::from(k) / 40.0).map(|a| [a, a.to_radians().cos().powi(-2)]).collect();
     Chart {
         title: "Error off the view axis".to_string(),
-        about: "Largest error over the tolerance, all cases. Above the line the promise is broken. Dashed curve: \
-                1/cos² of the angle, by which the published metric may be too small."
+        about: "Largest error divided by the tolerance, all cases. Above the horizontal line the tolerance is \
+                exceeded. The dashed curve, 1/cos² of the angle, is the factor by which the published metric may \
+                underestimate errors."
             .to_string(),
         x: axis("degrees off the view axis", Scale::Linear),
         y: axis("largest error / tolerance", Scale::Linear),
         series,
         guide: Some(Guide { name: "1/cos² of the angle".to_string(), points: guide }),
-        limit: Some((1.0, "the tolerance".to_string())),
+        limit: Some((1.0, "tolerance".to_string())),
     }
 }
 

@@ -1,17 +1,18 @@
-//! Text for HTML and SVG: escaping, and numbers that people can read.
+//! Text for HTML and SVG: escaping, file names, and numbers.
 
-/// Text with the characters that mean something to HTML replaced.
+/// Escapes the special characters of HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A name as part of a file name or an anchor.
+/// Converts a name to lower-case letters, digits and hyphens, for file names and anchors.
 pub fn slug(text: &str) -> String {
     let plain: String = text.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     plain.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }
 
-/// Three digits that count: 0.0123, 4.56, 78.9, 1234, and 12.3 k from ten thousand on.
+/// Formats a number with three significant digits: 0.0123, 4.56, 78.9. Whole numbers up to 9999 keep all digits, larger
+/// ones get a unit, as in 12.3 k. Infinite numbers and NaN become ∞.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return "∞".to_string();

@@ -1,5 +1,5 @@
-//! Rows in, pages out: one self-contained `index.html` and an SVG file a figure, drawn from the rows of a benchmark
-//! alone, on any machine, with or without a device.
+//! Draws the report of a benchmark or of the stress suite: a self-contained `index.html`, and one SVG file per chart of
+//! a benchmark. It needs only the rows that were written, and no device.
 
 mod axis;
 mod bars;
@@ -22,10 +22,13 @@ use figures::Figures;
 
 /// Name of the page.
 pub const PAGE: &str = "index.html";
-/// Folder of the static figures.
+/// Folder of the SVG files.
 pub const PLOTS: &str = "plots";
 
-/// Draws the report of a benchmark's directory from its rows and returns the path of the page.
+/// Draws the report of a benchmark's folder from its rows. Returns the path of the page.
+///
+/// # Errors
+/// If the rows cannot be read, there are none, or a file cannot be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let results = Results::read(folder)?;
     ensure!(!results.cases.is_empty(), "{}: {}: no rows yet", folder.display(), crate::bench::journal::ROWS);
@@ -40,7 +43,10 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Draws the page of a stability suite's directory from its rows and returns its path.
+/// Draws the page of a stress suite's folder from its rows. Returns its path.
+///
+/// # Errors
+/// If the rows cannot be read or the page cannot be written.
 pub fn write_stress(folder: &Path) -> Result<PathBuf> {
     let stress = Stress::read(folder)?;
     let path = folder.join(PAGE);

@@ -3,7 +3,7 @@
   const all = (selector) => document.querySelectorAll(selector);
   const tip = document.getElementById("tip");
 
-  // The value of a point, beside it and inside the window, also while the window scrolls to it.
+  // Tooltip with the label of a point, above or below it and inside the window. It follows the point while scrolling.
   let shown = null;
   const place = () => {
     const box = shown.getBoundingClientRect();
@@ -31,7 +31,7 @@
   const toggle = (box) => {
     const name = CSS.escape(box.dataset.toggle);
     all(`[data-series="${name}"]`).forEach((part) => {
-      // SVG elements have no `hidden` of their own.
+      // SVG elements have no `hidden` property, so the attribute is set and the style sheet hides them.
       part.toggleAttribute("hidden", !box.checked);
     });
   };

@@ -1,5 +1,7 @@
-//! The page: everything in one file that asks the network for nothing. Without scripts it shows all there is; the
-//! script adds values on hover and focus, the choice of techniques and scenes, and linear axes.
+//! The page of a benchmark: one HTML file without external resources.
+//!
+//! Without JavaScript it shows everything. The script adds tooltips, and controls for techniques, scenes and linear
+//! axes.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -11,10 +13,10 @@ use super::html::{escape, number, slug};
 use super::{pictures, tables};
 use crate::bench::results::{CaseResult, Results};
 
-/// Colours of the series on dark ground.
+/// Colours of the series on a dark background.
 const DARK: [&str; 7] = ["#4aa8e8", "#ff8a3d", "#2fc99a", "#e79bc6", "#8fd0f5", "#f0b93a", "#b5b5b5"];
 
-/// The whole page.
+/// Returns the page. `folder` is the benchmark's, for its pictures.
 pub fn page(results: &Results, figures: &Figures, folder: &Path) -> String {
     let mut body = head(results);
     body += &controls(figures);
@@ -24,14 +26,14 @@ pub fn page(results: &Results, figures: &Figures, folder: &Path) -> String {
     let _ = write!(
         body,
         "<section><h2>Across scenes</h2><div class=\"figures\">{}{}</div></section>",
-        figure(&figures.size, "Only one size of terrain was drawn along one path."),
+        figure(&figures.size, "Only one size of terrain was measured along each path."),
         figure(&figures.angle, "No error was measured by angle.")
     );
     let _ = write!(
         body,
-        "<section><h2>Beside what others published</h2><p>Other machines, other data: what compares is the shape, not \
-         the number. A row under our own protocol compares on the same kind of machine only.</p>{}</section>\
-         <section><h2>What the scenes left out</h2>{}</section>",
+        "<section><h2>Comparison with published results</h2><p>Machines and data differ, so that trends can be compared, \
+         but not absolute numbers. Rows under this program's own protocol can be compared on the same kind of \
+         machine.</p>{}</section><section><h2>Scene plans: features left out</h2>{}</section>",
         tables::published(results),
         tables::plans(&results.header.plans)
     );
@@ -46,7 +48,7 @@ pub fn page(results: &Results, figures: &Figures, folder: &Path) -> String {
     )
 }
 
-/// The styles of series and parts, in the light and in the dark.
+/// Returns the style sheet of series and parts, for light and dark backgrounds.
 fn colours() -> String {
     let set = |colours: &[&str]| -> String {
         colours.iter().enumerate().map(|(k, colour)| format!(".s{k}{{color:{colour}}}")).collect()
@@ -54,24 +56,26 @@ fn colours() -> String {
     format!("{}{}@media(prefers-color-scheme:dark){{{}}}", bars::style(), set(&COLOURS), set(&DARK))
 }
 
+/// Returns the header with facts about the run.
 fn head(results: &Results) -> String {
     let header = &results.header;
     let (machine, device) = (&header.machine, &header.device);
     let software = if device.is_cpu { " (software)" } else { "" };
-    let commit = header.commit.as_ref().map_or("not known".to_string(), |commit| commit.clone());
+    let commit = header.commit.as_deref().unwrap_or("unknown");
     let facts = [
         ("Device", format!("{}{software}", device.name)),
         ("Driver", device.driver.clone()),
         ("Machine", format!("{}, {} threads, {}", machine.cpu, machine.cores, machine.system)),
         ("Program", format!("cuesta {}, commit {commit}", header.program)),
-        ("Begun", header.date.clone()),
-        ("Asked for", header.arguments.join(" ")),
+        ("Started", header.date.clone()),
+        ("Arguments", header.arguments.join(" ")),
     ];
     let facts: String =
         facts.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value))).collect();
     format!("<header><h1>Error against run time</h1><dl>{facts}</dl></header>")
 }
 
+/// Returns the bar of controls: scene, techniques, axes.
 fn controls(figures: &Figures) -> String {
     let series = |(k, name): (usize, &String)| {
         let name = escape(name);
@@ -91,11 +95,12 @@ fn controls(figures: &Figures) -> String {
         String::new()
     };
     format!(
-        "<nav aria-label=\"What is shown\">{scenes}<fieldset><legend>Techniques</legend>{series}</fieldset>\
+        "<nav aria-label=\"Filters\">{scenes}<fieldset><legend>Techniques</legend>{series}</fieldset>\
          <label><input type=\"checkbox\" id=\"logarithm\" checked>Logarithmic axes</label></nav>"
     )
 }
 
+/// Returns the charts, tables and pictures of a scene.
 fn section(results: &Results, scene: &SceneFigures, folder: &Path) -> String {
     let absent = "Not measured in this run.";
     let bars = &scene.split;
@@ -105,11 +110,11 @@ fn section(results: &Results, scene: &SceneFigures, folder: &Path) -> String {
         framed("tall", &bars.title, &bars.about, &bars.inline())
     };
     let mut figures: Vec<String> = scene.charts.iter().map(|(_, chart)| figure(chart, absent)).collect();
-    // The two charts that matter most stand side by side, the tall one beside the others.
+    // The two most important charts come first; the tall one follows beside the remaining ones.
     figures.insert(figures.len().min(2), split);
     format!(
         "<section class=\"scene\" id=\"{}\"><h2>{}</h2><div class=\"figures\">{}</div>{}\
-         <h3>The largest errors</h3>{}</section>",
+         <h3>Frames with the largest errors</h3>{}</section>",
         slug(&scene.name),
         escape(&scene.name),
         figures.concat(),
@@ -118,6 +123,7 @@ fn section(results: &Results, scene: &SceneFigures, folder: &Path) -> String {
     )
 }
 
+/// Returns a chart in a frame, with its linear form if it has one; or the text `absent` if the chart is empty.
 fn figure(chart: &Chart, absent: &str) -> String {
     if chart.is_empty() {
         return empty(&chart.title, absent);
@@ -139,10 +145,11 @@ fn empty(title: &str, why: &str) -> String {
     format!("<figure class=\"empty\"><h3>{}</h3><p class=\"absent\">{}</p></figure>", escape(title), escape(why))
 }
 
-/// Errors below this, pixels, are not worth a picture.
+/// Smallest error for which a picture is shown, pixels.
 const VISIBLE_PX: f64 = 0.01;
 
-/// Of each series the case whose worst frame exceeds its tolerance most, with its pictures.
+/// Returns the pictures of the worst frame of each series: that of the case whose error is largest relative to its
+/// tolerance.
 fn worst(results: &Results, scene: &str, folder: &Path) -> String {
     let excess = |result: &CaseResult| {
         let worst = result.errors.as_ref().and_then(|errors| errors.worst.as_ref())?;
@@ -161,7 +168,7 @@ fn worst(results: &Results, scene: &str, folder: &Path) -> String {
     if shown.is_empty() { "<p class=\"absent\">No pictures of errors were kept.</p>".to_string() } else { shown }
 }
 
-/// A case's worst frame and its difference from the truth.
+/// Returns the picture of a case's worst frame, and its difference from the reference picture.
 fn pair(result: &CaseResult, folder: &Path) -> Option<String> {
     let worst = result.errors.as_ref()?.worst.as_ref()?;
     let name = format!("{}, {} px", result.case.series(), number(result.case.tolerance_px));
@@ -170,10 +177,10 @@ fn pair(result: &CaseResult, folder: &Path) -> Option<String> {
         pictures::data_uri(folder, file).map(|uri| format!("<img alt=\"{alt}\" src=\"{uri}\">"))
     };
     let picture = image(worst.picture.as_ref()?, "as drawn")?;
-    let difference = worst.difference.as_ref().and_then(|file| image(file, "difference from the truth"));
+    let difference = worst.difference.as_ref().and_then(|file| image(file, "difference from the reference"));
     Some(format!(
         "<figure class=\"worst\" data-series=\"{}\"><div>{picture}{}</div><figcaption>{}: frame {}, largest error {} px. \
-         Left or above as drawn, then the difference from the truth.</figcaption></figure>",
+         Left or above: as drawn. Right or below: difference from the reference.</figcaption></figure>",
         escape(&result.case.series()),
         difference.unwrap_or_default(),
         escape(&name),

@@ -1,4 +1,4 @@
-//! Pictures of a benchmark's directory as part of a page.
+//! Embeds picture files in a page.
 
 use std::path::{Component, Path};
 
@@ -7,11 +7,12 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::FilterType;
 
-/// Width of a picture on the page, pixels, at most.
+/// Largest width of an embedded picture, pixels.
 const WIDTH: u32 = 960;
+/// JPEG quality of embedded pictures, 1 to 100.
 const QUALITY: u8 = 85;
 
-/// A picture file as a data URI; `None` if it is missing, no picture, or outside the directory.
+/// Returns a picture file as a data URI of a JPEG; `None` if it is missing, not a picture, or outside the folder.
 pub fn data_uri(folder: &Path, file: &str) -> Option<String> {
     let inside = Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
     let picture = image::open(inside.then(|| folder.join(file))?).ok()?.into_rgb8();

@@ -1,4 +1,5 @@
-//! Figures that others published, and the best of ours to stand beside each: all of them facts of one data file.
+//! Published results of other terrain renderers, and the results of a benchmark to show beside them. Both the numbers
+//! and the rules that select our cases come from `published.json`.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +9,17 @@ use super::html::number;
 use crate::bench::results::{CaseResult, Results, TimeSummary, frame_ratio};
 use crate::bench::statistics::Estimate;
 
-/// One published table.
+/// One published table with rules for comparison.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
     /// Authors, year and title.
     pub source: String,
-    /// Table or section.
+    /// Table or section of the source.
     pub table: String,
-    /// Meaning of its numbers.
+    /// Meaning of the numbers.
     pub about: String,
-    /// Machine, picture, data, path.
+    /// Machine, picture size, data and path of the measurement.
     pub conditions: String,
     /// Names of the columns.
     pub columns: Vec<String>,
@@ -30,40 +31,47 @@ pub struct Published {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PublishedRow {
-    /// As published.
+    /// One cell per column, as published.
     pub cells: Vec<String>,
-    /// Cases compared with it.
+    /// Rules that select our cases to show beside the row. Each selects one case at most, unless it has `over`.
     #[serde(default)]
     pub ours: Vec<Rule>,
 }
 
-/// Conditions on a case to be compared with a published row; of several, the fastest is.
+/// Conditions on a case to show beside a published row, and what to show of it. Conditions that are absent always hold.
+/// Of several cases that meet all conditions, the fastest is shown.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rule {
-    /// With its variant; without one, its default form.
+    /// `technique` or `technique:variant`. Without a variant, only the default form matches.
     technique: Option<String>,
+    /// Settings that the case must have.
     settings: BTreeMap<String, String>,
+    /// Tolerance, pixels.
     tolerance_px: Option<f64>,
+    /// Name of the terrain.
     terrain: Option<String>,
+    /// Samples along each side of the terrain.
     side: Option<u32>,
+    /// Name of the camera path.
     path: Option<String>,
-    /// Most that the 99th percentile of the peers' metric may be, pixels.
+    /// Largest 99th percentile of the other renderers' error metric, pixels.
     peers_p99_px: Option<f64>,
-    /// Also show this statistic of the technique.
+    /// Name of a statistic of the technique to show too.
     figure: Option<String>,
-    /// Compare the selection time alone, on the host; of several cases, that of the fastest selection.
+    /// Show only the selection time on the host, of the case with the fastest selection.
     selection: bool,
-    /// Compare the speed relative to a case of this rule, at the same tolerance in the same scene.
+    /// Show the speed of all matching cases relative to cases of this rule, at the same tolerance in the same scene.
     over: Option<Box<Rule>>,
 }
 
-/// Every published table.
+/// Returns all published tables.
 pub fn tables() -> Vec<Published> {
     serde_json::from_str(include_str!("published.json")).expect("the published figures are checked by a test")
 }
 
 impl Rule {
+    /// Returns true if a case meets all conditions.
     fn allows(&self, result: &CaseResult) -> bool {
         let case = &result.case;
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
@@ -77,7 +85,7 @@ impl Rule {
             && self.peers_p99_px.is_none_or(|px| peers.is_some_and(|peers| peers.p99 <= px))
     }
 
-    /// Ours in words; `None` if no such case was run.
+    /// Describes the selected cases; `None` if no case was timed that meets the conditions.
     pub fn ours(&self, results: &Results) -> Option<String> {
         match &self.over {
             Some(other) => self.speed_ups(other, results),
@@ -86,7 +94,7 @@ impl Rule {
         }
     }
 
-    /// Returns the speed of the cases relative to those of the other rule, one by one.
+    /// Describes the speed of each case relative to the case of `other` with the same tolerance, metric and scene.
     fn speed_ups(&self, other: &Rule, results: &Results) -> Option<String> {
         let speed_up = |result: &CaseResult| {
             let same = |slow: &&CaseResult| {
@@ -103,11 +111,12 @@ impl Rule {
         (!found.is_empty()).then(|| found.join("\n"))
     }
 
-    /// The cases that were timed.
+    /// Returns the timed cases that meet the conditions.
     fn timed<'a>(&self, results: &'a Results) -> impl Iterator<Item = (&'a CaseResult, &'a TimeSummary)> {
         results.cases.iter().filter(|result| self.allows(result)).filter_map(|r| Some((r, r.time.as_ref()?)))
     }
 
+    /// Describes the case with the shortest selection time.
     fn fastest_selection(&self, results: &Results) -> Option<String> {
         let (result, time) = self.timed(results).min_by(|a, b| a.1.select_ms.total_cmp(&b.1.select_ms))?;
         let [series, px] = [result.case.series(), number(result.case.tolerance_px)];
@@ -115,10 +124,11 @@ impl Rule {
         let [often, rate] =
             [1000.0, time.triangles * 1000.0].map(|n| number(n / time.select_ms.max(f64::MIN_POSITIVE)));
         Some(format!(
-            "{series} {px} px: {ms} ms of selection ({often} a second), {triangles} triangles ({rate} a second)"
+            "{series} {px} px: {ms} ms of selection ({often} per second), {triangles} triangles ({rate} per second)"
         ))
     }
 
+    /// Describes the case with the shortest frame time.
     fn fastest(&self, results: &Results) -> Option<String> {
         let timed = self.timed(results);
         let timed = timed.filter(|(_, time)| self.figure.as_ref().is_none_or(|name| time.stats.contains_key(name)));
@@ -127,10 +137,11 @@ impl Rule {
             self.figure.as_ref().map_or(String::new(), |name| format!("; {name}: {}", number(time.stats[name])));
         let frame_ms = time.frame_ms.value;
         let peers = result.errors.as_ref().and_then(|errors| errors.peers_px);
-        let error = peers
-            .map_or(String::new(), |p| format!("; peers' metric mean {}, p99 {} px", number(p.mean), number(p.p99)));
+        let error = peers.map_or(String::new(), |p| {
+            format!("; their error metric: mean {}, p99 {} px", number(p.mean), number(p.p99))
+        });
         Some(format!(
-            "{} {} px: {} ms ({} fps), {} triangles ({} a second), {} draws{error}{figure}",
+            "{} {} px: {} ms ({} fps), {} triangles ({} per second), {} draws{error}{figure}",
             result.case.series(),
             number(result.case.tolerance_px),
             number(frame_ms),
@@ -147,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_table_is_whole_and_says_where_it_is_from() {
+    fn every_table_is_complete_and_names_its_source() {
         let tables = tables();
         assert!(tables.len() >= 8);
         for table in &tables {

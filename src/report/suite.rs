@@ -1,5 +1,5 @@
-//! The page of a stability suite: how many checks passed, what failed and how to see it again, every value, and the
-//! pictures of what was measured.
+//! The page of the stress suite: numbers of passed checks, failures with the commands that repeat them, pictures, and
+//! all values.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,21 +9,21 @@ use super::pictures;
 use super::tables::table;
 use crate::stress::{Row, Stress};
 
-/// The whole page.
+/// Returns the page. `folder` is the suite's, for its pictures.
 pub fn page(stress: &Stress, folder: &Path) -> String {
     let [passed, failed] = stress.counts();
     let device = stress.device.as_deref().unwrap_or("none: no pictures were drawn");
-    let ended = stress.ended.as_deref().map(|why| ("Not everything was tried", why));
+    let ended = stress.ended.as_deref().map(|why| ("Incomplete", why));
     let facts = [("Program", stress.program.as_str()), ("Device", device)].into_iter().chain(ended);
     let facts: String =
         facts.map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value))).collect();
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>cuesta: the stability suite</title><link rel=\"icon\" href=\"data:,\"><style>{}</style></head><body>\
-         <header><h1>The stability suite</h1><dl>{facts}</dl></header>\
+         <title>cuesta: stress suite</title><link rel=\"icon\" href=\"data:,\"><style>{}</style></head><body>\
+         <header><h1>Stress suite</h1><dl>{facts}</dl></header>\
          <section><h2>{passed} checks passed, {failed} failed</h2>{}</section>\
-         <section><h2>What failed</h2>{}</section>{}{}</body></html>\n",
+         <section><h2>Failures</h2>{}</section>{}{}</body></html>\n",
         include_str!("page.css"),
         summary(stress),
         failures(stress),
@@ -32,12 +32,12 @@ pub fn page(stress: &Stress, folder: &Path) -> String {
     )
 }
 
-/// Number of checks of each family that a technique passed.
+/// Returns a table of passed checks by technique and family.
 fn summary(stress: &Stress) -> String {
     let mut counts: BTreeMap<&str, BTreeMap<&str, [usize; 2]>> = BTreeMap::new();
     let mut families: Vec<&str> = Vec::new();
     for row in stress.cases.iter().filter(|row| row.limit.is_some()) {
-        // Settings of a technique count for it.
+        // A technique with settings counts for the technique.
         let technique = row.technique.split(' ').next().unwrap_or_default();
         let [passed, all] = counts.entry(technique).or_default().entry(&row.family).or_default();
         *passed += usize::from(row.pass);
@@ -46,7 +46,7 @@ fn summary(stress: &Stress) -> String {
             families.push(&row.family);
         }
     }
-    let columns: Vec<_> = std::iter::once("tried").chain(families.iter().copied()).map(String::from).collect();
+    let columns: Vec<_> = std::iter::once("technique").chain(families.iter().copied()).map(String::from).collect();
     let cell = |of: &BTreeMap<&str, [usize; 2]>, family: &str| {
         of.get(family).map_or("–".to_string(), |[passed, all]| format!("{passed} of {all}"))
     };
@@ -57,17 +57,18 @@ fn summary(stress: &Stress) -> String {
     table(&columns, &rows, &[])
 }
 
+/// Returns a table of the failed checks with the commands that repeat them.
 fn failures(stress: &Stress) -> String {
     let failed: Vec<_> = stress.cases.iter().filter(|row| !row.pass).collect();
     if failed.is_empty() {
-        return "<p>Nothing.</p>".to_string();
+        return "<p>None.</p>".to_string();
     }
-    let columns = ["case", "tried", "check", "value", "limit", "how", "again"].map(String::from);
+    let columns = ["case", "technique", "check", "value", "limit", "reason", "command"].map(String::from);
     let cells = |row: &&Row| {
         let case = format!("{}: {}", escape(&row.family), escape(&row.name));
-        let again = format!("<code>{}</code>", escape(&row.repeat));
-        let how = escape(row.why.as_deref().unwrap_or_default());
-        vec![case, escape(&row.technique), escape(&row.check), value(row.value), value(row.limit), how, again]
+        let command = format!("<code>{}</code>", escape(&row.repeat));
+        let reason = escape(row.why.as_deref().unwrap_or_default());
+        vec![case, escape(&row.technique), escape(&row.check), value(row.value), value(row.limit), reason, command]
     };
     table(&columns, &failed.iter().map(cells).collect::<Vec<_>>(), &[])
 }
@@ -76,7 +77,7 @@ fn value(number_of: Option<f64>) -> String {
     number_of.map_or("–".to_string(), number)
 }
 
-/// The pictures beside the rows.
+/// Returns the pictures of measurements; empty if there are none.
 fn measured(stress: &Stress, folder: &Path) -> String {
     let figure = |picture: &crate::stress::Picture| {
         let caption = escape(&picture.caption);
@@ -87,12 +88,12 @@ fn measured(stress: &Stress, folder: &Path) -> String {
     if figures.is_empty() {
         return String::new();
     }
-    format!("<section><h2>What was measured</h2><div class=\"figures\">{figures}</div></section>")
+    format!("<section><h2>Measurements</h2><div class=\"figures\">{figures}</div></section>")
 }
 
-/// Every check, a table a family, closed at first.
+/// Returns all rows, in one collapsed table per family.
 fn every_row(stress: &Stress) -> String {
-    let columns = ["case", "tried", "check", "value", "limit", ""].map(String::from);
+    let columns = ["case", "technique", "check", "value", "limit", "result"].map(String::from);
     let mut families: Vec<&str> = stress.cases.iter().map(|row| row.family.as_str()).collect();
     families.dedup();
     let of_family = |family: &&str| {
@@ -114,5 +115,5 @@ fn every_row(stress: &Stress) -> String {
         )
     };
     let tables: String = families.iter().map(of_family).collect();
-    format!("<section><h2>Every value</h2>{tables}</section>")
+    format!("<section><h2>All values</h2>{tables}</section>")
 }

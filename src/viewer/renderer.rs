@@ -92,6 +92,7 @@ impl WindowRenderer {
         let mut swapchain = Swapchain::new(&gpu, surface, setup.vsync)?;
         let (entry, settings) = &setup.technique;
         let technique = entry.prepare(&setup.field, settings).map_err(anyhow::Error::msg)?;
+        (setup.on_prepared)();
         let plan = plan(&gpu, setup, &setup.look, technique.as_ref())?;
         swapchain.set_depth(plan.has_depth())?;
         let (formats, size) = (swapchain.formats(), setup.view.size);

@@ -43,6 +43,8 @@ pub struct Setup {
     pub vsync: bool,
     /// Session length, seconds; `None` for unlimited.
     pub seconds: Option<f64>,
+    /// Function that is called once the first technique is prepared.
+    pub on_prepared: Box<dyn Fn()>,
     /// Function that saves a screenshot.
     pub save: fn(&Path, &image::RgbaImage) -> Result<()>,
     /// Function that registers a handler for user interrupts (Ctrl-C).

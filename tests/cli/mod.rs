@@ -1,6 +1,7 @@
 //! The program, run as a person runs it.
 
 mod endless;
+mod info;
 mod numbers;
 #[cfg(feature = "vulkan")]
 mod overlays;
@@ -134,7 +135,7 @@ fn stress_prints_the_contract_and_writes_a_page() {
     let page = folder.path().join("kept/index.html");
     std::fs::remove_file(&page).expect("a page");
     json(folder.path(), &["report", "kept"]);
-    assert!(std::fs::read_to_string(page).expect("a page again").contains("The stability suite"));
+    assert!(std::fs::read_to_string(page).expect("a page again").contains("<h1>Stress suite</h1>"));
     refused(folder.path(), &["stress", "--family", "weather"], &["--family weather", "position", "stiff"]);
     refused(folder.path(), &["stress", "--case", "weather"], &["--case weather"]);
     refused(folder.path(), &["stress", "--technique", "clusters:x"], &["--technique clusters:x", "gpu-driven"]);

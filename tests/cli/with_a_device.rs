@@ -348,7 +348,7 @@ fn an_interrupt_keeps_rows_and_pictures() {
         let min = kept.max(lines());
         let (output, was_running) = interrupted_when(at, &bench, || lines() > min);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        let is_stopped = said.contains("the same command goes on");
+        let is_stopped = said.contains("the same command resumes");
         assert_eq!(code(&output), i32::from(is_stopped), "{said}");
         assert!(at.join("b/index.html").is_file() && lines() > kept);
         stops += u32::from(was_running && is_stopped);

@@ -2,6 +2,7 @@
 
 mod checksums;
 mod crs;
+mod damaged;
 mod exact;
 mod known;
 mod lzw;

@@ -1,4 +1,4 @@
-//! A counter-example as a picture: the drawn triangles in plan around what is wrong, north up.
+//! Draws a counter-example as a picture: the triangles around the fault in plan view, north up.
 
 use cuesta::internal::draw::expand::Drawn;
 use cuesta::internal::height::surface::{Corner, Triangle, doubled_area};
@@ -7,23 +7,24 @@ use image::{Rgb, RgbImage};
 
 /// Width and height of the picture, pixels.
 const SIZE: u32 = 512;
-/// Cells around the triangles at fault, at least.
+/// Smallest margin around the triangles at fault, cells.
 const MARGIN: f64 = 1.5;
 
 const GROUND: Rgb<u8> = Rgb([255, 255, 255]);
 const TERRAIN: Rgb<u8> = Rgb([214, 224, 206]);
 const EDGE: Rgb<u8> = Rgb([110, 125, 100]);
-/// A triangle at fault, and where two of them lie on each other.
+/// A triangle at fault.
 const FAULT: Rgb<u8> = Rgb([240, 140, 120]);
+/// Overlap of two triangles at fault.
 const FAULT_TWICE: Rgb<u8> = Rgb([200, 30, 30]);
 const FAULT_EDGE: Rgb<u8> = Rgb([130, 0, 0]);
-/// Land that is missing.
+/// Terrain that is missing.
 const MISSING: Rgb<u8> = Rgb([90, 130, 240]);
 /// A vertex with two heights.
 const VERTEX: Rgb<u8> = Rgb([20, 20, 20]);
 
-/// Draws the triangles (grey-green) and those at fault: red, darker where they overlap; what is missing is blue; a
-/// vertex with two heights gets a dot.
+/// Draws a fault. Triangles are grey-green, those at fault red and darker where they overlap. Missing terrain is blue.
+/// A dot marks a vertex with two heights.
 pub fn picture(triangles: &[Drawn], found: &CounterExample) -> RgbImage {
     let window = Window::around(&found.triangles);
     let mut picture = RgbImage::from_pixel(SIZE, SIZE, GROUND);
@@ -44,14 +45,15 @@ pub fn picture(triangles: &[Drawn], found: &CounterExample) -> RgbImage {
     picture
 }
 
-/// The square of the lattice that the picture shows.
+/// The square that the picture shows.
 struct Window {
-    /// Its north-western corner, lattice units.
+    /// North-western corner (x, z), samples.
     first: [f64; 2],
     px_per_cell: f64,
 }
 
 impl Window {
+    /// Returns a square around triangles with a margin of half their extent, at least [`MARGIN`].
     fn around(triangles: &[Triangle]) -> Self {
         let along = |axis: fn(&Corner) -> i32| {
             let all = || triangles.iter().flatten().map(axis).map(f64::from);
@@ -69,21 +71,22 @@ impl Window {
         [along(corner.x, self.first[0]), along(corner.z, self.first[1])]
     }
 
-    /// The pixels, along x and along y, in which a box around points lies.
+    /// Returns the ranges of pixel columns and rows of a bounding box around points.
     fn pixels(points: &[[f64; 2]]) -> [std::ops::Range<u32>; 2] {
         [0, 1].map(|k| {
             let low = points.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min);
             let high = points.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max);
-            // Casts of what lies outside stop at 0.
+            // Casts of negative numbers saturate at 0.
             (low.floor() as u32).min(SIZE)..(high.ceil() as u32).min(SIZE)
         })
     }
 
+    /// Returns true if a triangle's bounding box overlaps the picture.
     fn meets(&self, triangle: &Triangle) -> bool {
         Self::pixels(&triangle.each_ref().map(|c| self.at(c))).iter().all(|range| !range.is_empty())
     }
 
-    /// Colours the pixels whose centres lie in a triangle by what is there.
+    /// Colours the pixels whose centres lie in a triangle. `colour` maps the present colour to the new one.
     fn fill(&self, picture: &mut RgbImage, triangle: &Triangle, colour: impl Fn(Rgb<u8>) -> Rgb<u8>) {
         let corners = triangle.each_ref().map(|c| self.at(c));
         let turn = doubled_area(triangle).signum() as f64;
@@ -106,7 +109,7 @@ impl Window {
         (0..3).for_each(|k| self.line(picture, [&triangle[k], &triangle[(k + 1) % 3]], colour, radius));
     }
 
-    /// A line of square dots, `radius` pixels to each side.
+    /// Draws a line of square dots with a side of 2 · `radius` + 1 pixels.
     fn line(&self, picture: &mut RgbImage, ends: [&Corner; 2], colour: Rgb<u8>, radius: i32) {
         let [from, to] = ends.map(|corner| self.at(corner));
         let steps = (to[0] - from[0]).abs().max((to[1] - from[1]).abs()).ceil().max(1.0);

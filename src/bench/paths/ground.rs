@@ -1,13 +1,13 @@
-//! The land under a path: heights anywhere, and the lengths that paths are measured in.
+//! The terrain under a camera path: heights at any position, and lengths that scale with the field.
 
 use crate::height::Field;
 
-/// A height above ground that shows a valley and its flanks, metres.
+/// Altitude of an overview flight, metres above ground.
 const ALTITUDE_M: f64 = 300.0;
 /// Eye height of a person, metres above ground.
 const EYE_M: f64 = 1.7;
 
-/// A field as something to fly over.
+/// A field with the heights and lengths that paths need.
 pub struct Ground<'a> {
     /// The field.
     pub field: &'a Field,
@@ -16,18 +16,20 @@ pub struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    /// The ground of a field.
+    /// Wraps a field and takes its height range.
     pub fn of(field: &'a Field) -> Self {
         let statistics = field.statistics();
         Self { field, range: [statistics.min.into(), statistics.max.into()] }
     }
 
-    /// Height at a world position (x, z), bilinear; outside, that of the border. Holes are filled.
+    /// Returns the height at a world position (x, z), metres. Interpolation is bilinear. Outside the field it is the
+    /// height of the nearest border point, in holes that of their filling.
     pub fn height(&self, at: [f64; 2]) -> f64 {
         self.height_of_sample(self.sample(at))
     }
 
-    /// Height of what a person can be in over a world position (x, z): up to the ceiling, if there is one, metres.
+    /// Returns the free height above the ground at a world position (x, z), metres: up to the ceiling, or twice the
+    /// eye height if the field has none.
     pub fn room(&self, at: [f64; 2]) -> f64 {
         match self.field.ceiling() {
             Some(ceiling) => bilinear(ceiling, self.sample(at)) - self.height(at),
@@ -35,23 +37,24 @@ impl<'a> Ground<'a> {
         }
     }
 
+    /// Returns a world position (x, z) in units of samples.
     fn sample(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| (at[k] - self.field.origin[k]) / self.field.spacing[k])
     }
 
-    /// Height at a position in samples, bilinear; outside, that of the border.
+    /// Returns the height at a position in units of samples, as [`Self::height`].
     pub fn height_of_sample(&self, at: [f64; 2]) -> f64 {
         bilinear(self.field, at)
     }
 
-    /// World position (x, z) of a place given in parts of the field's extent.
+    /// Returns the world position (x, z) of a place given as shares of the field's extent, 0 to 1.
     pub fn place(&self, u: f64, v: f64) -> [f64; 2] {
         let size = self.field.size();
         let parts = [u, v];
         [0, 1].map(|k| self.field.origin[k] + parts[k] * f64::from(size[k] - 1) * self.field.spacing[k])
     }
 
-    /// World position (x, z) of the highest of about 65 000 samples.
+    /// Returns the world position (x, z) of the highest sample on a grid of at most 256 × 256 samples.
     pub fn summit(&self) -> [f64; 2] {
         let [w, h] = self.field.size();
         let step = [w, h].map(|n| n.div_ceil(256) as usize);
@@ -62,28 +65,29 @@ impl<'a> Ground<'a> {
         [at.x, at.z]
     }
 
-    /// The shorter side, metres.
+    /// Returns the length of the field's shorter side, metres.
     pub fn extent(&self) -> f64 {
         let (low, high) = (self.place(0.0, 0.0), self.place(1.0, 1.0));
         (high[0] - low[0]).min(high[1] - low[1])
     }
 
-    /// 300 m, or less over a small field, metres above ground.
+    /// Returns the altitude of an overview flight, metres above ground: 300 m, or a quarter of a small field's extent.
     pub fn altitude(&self) -> f64 {
         ALTITUDE_M.min(self.extent() / 4.0)
     }
 
-    /// A person's eyes, lower over a small field, metres above ground.
+    /// Returns the eye height of a walk, metres above ground: 1.7 m, or a fiftieth of a small field's extent.
     pub fn eye_height(&self) -> f64 {
         EYE_M.min(self.extent() / 50.0)
     }
 
-    /// The near plane, metres: a tenth, or less over a small field.
+    /// Returns the distance of the near plane, metres: 0.1 m, or a thousandth of a small field's extent.
     pub fn near(&self) -> f64 {
         0.1f64.min(self.extent() / 1000.0)
     }
 }
 
+/// Returns the height at a position in units of samples, clamped to the field.
 fn bilinear(field: &Field, at: [f64; 2]) -> f64 {
     let last = field.size().map(|n| n - 1);
     let clamped = [0, 1].map(|k| at[k].clamp(0.0, f64::from(last[k])));

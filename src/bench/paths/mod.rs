@@ -1,5 +1,5 @@
-//! The named paths: pure functions of a field, a name and a number of frames. A frame stands for 1/60 s, so two runs
-//! see the same views whatever the machine; a path is flown whole, however many frames it is cut into.
+//! Named camera paths. A path depends only on the field and the number of frames, so that every machine draws the same
+//! views. The number of frames divides the whole path into steps. Each frame stands for 1/60 s of scene time.
 
 mod cave;
 mod ground;
@@ -13,57 +13,59 @@ use ground::Ground;
 
 pub use pose::{Opening, Pose};
 
-/// Time that a frame stands for, seconds.
+/// Scene time between two frames, seconds.
 pub const TIME_STEP_S: f64 = 1.0 / 60.0;
 
-/// One line of [`PATHS`].
+/// A named camera path, one row of [`PATHS`].
 pub struct Path {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// Description in one sentence.
+    /// Description in a few words, for help texts.
     pub about: &'static str,
+    /// Returns this many poses along the whole path.
     poses: fn(&Ground, usize) -> Vec<Pose>,
 }
 
-/// Every path.
+/// All paths.
 #[rustfmt::skip]
 pub const PATHS: &[Path] = &[
     Path { name: "circle", about: "a circle 300 m above ground, looking along it and inwards", poses: shapes::circle },
     Path { name: "skim", about: "straight across at eye height", poses: shapes::skim },
-    Path { name: "corner", about: "from corner to corner, 300 m above the highest ground of the way", poses: shapes::corner },
-    Path { name: "spin", about: "one turn on the spot, 90 degrees wide", poses: shapes::spin },
-    Path { name: "zoom", about: "from 90 degrees wide to 3, towards the summit", poses: shapes::zoom },
+    Path { name: "corner", about: "from corner to corner, 300 m above the highest ground on the way", poses: shapes::corner },
+    Path { name: "spin", about: "one full turn on the spot, 90 degrees wide", poses: shapes::spin },
+    Path { name: "zoom", about: "zoom towards the summit, from 90 to 3 degrees wide", poses: shapes::zoom },
     Path { name: "dive", about: "from far above down to eye height", poses: shapes::dive },
-    Path { name: "hover", about: "back and forth, so that every distance around crosses a switching threshold many times", poses: shapes::hover },
-    Path { name: "teleport", about: "somewhere else in every frame, pseudo-random", poses: shapes::teleport },
-    Path { name: "cave", about: "through a cave from end to end, along the widest way", poses: cave::cave },
-    Path { name: "fly", about: "the peers' path near the ground", poses: peers::fly },
-    Path { name: "high", about: "the peers' path above all land", poses: peers::high },
+    Path { name: "hover", about: "back and forth, so that levels of detail switch many times", poses: shapes::hover },
+    Path { name: "teleport", about: "a pseudo-random position in every frame", poses: shapes::teleport },
+    Path { name: "cave", about: "through a cave from end to end, along its widest passage", poses: cave::cave },
+    Path { name: "fly", about: "straight and near the ground, as other renderers were measured", poses: peers::fly },
+    Path { name: "high", about: "the same line above the highest ground", poses: peers::high },
 ];
 
-/// The path with this name.
+/// Returns the path with this name.
 pub fn find(name: &str) -> Option<&'static Path> {
     PATHS.iter().find(|path| path.name == name)
 }
 
-/// The near plane of every path over a field, metres.
+/// Returns the distance of the near plane for all paths over a field, metres.
 pub fn near(field: &Field) -> f64 {
     Ground::of(field).near()
 }
 
 impl Path {
-    /// The poses of the whole path in `frames` steps.
+    /// Returns `frames` poses along the whole path.
     pub fn poses(&self, field: &Field, frames: usize) -> Vec<Pose> {
         (self.poses)(&Ground::of(field), frames)
     }
 
-    /// The views of the whole path in `frames` steps.
+    /// Returns `frames` views along the whole path, for pictures of `size` (x, y) pixels.
     pub fn views(&self, field: &Field, frames: usize, size: [u32; 2], tolerance: Tolerance) -> Vec<View> {
         views(&self.poses(field, frames), near(field), size, tolerance)
     }
 }
 
-/// A view a pose, the scene's time going on from frame to frame.
+/// Returns one view per pose. Scene time advances by [`TIME_STEP_S`] from frame to frame. `near` is in metres, `size`
+/// in pixels.
 pub fn views(poses: &[Pose], near: f64, size: [u32; 2], tolerance: Tolerance) -> Vec<View> {
     let view =
         |(k, pose): (u32, &Pose)| View { time_s: f64::from(k) * TIME_STEP_S, ..pose.view(size, near, tolerance) };
@@ -76,7 +78,8 @@ mod tests {
     use crate::height::synth::{Kind, synth};
     use crate::view::Metric;
 
-    /// From the smallest field to one as large as any, the latter a small one repeated.
+    /// Fields of extreme sizes: 2 × 2 samples, a 64 × 64 field repeated 128 × 128 times, a narrow one far from the
+    /// origin, and one with a single spike.
     fn fields() -> Vec<Field> {
         let huge = synth(Kind::Fractal, [64, 64], 1).tiled([128, 128]);
         let mut flat = synth(Kind::Eroded, [300, 40], 5);

@@ -1,17 +1,17 @@
-//! A pose of the camera on a path.
+//! Position, direction and field of view of the camera at one frame of a path.
 
 use glam::DVec3;
 
 use crate::view::{Lens, Tolerance, View};
 
-/// One pose of a path.
+/// The camera at one frame of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// World metres.
+    /// Position of the eye, world metres.
     pub eye: DVec3,
     /// Heading, degrees: 0 = east, 90 = south.
     pub yaw: f64,
-    /// Degrees above the horizon.
+    /// Pitch, degrees above the horizon.
     pub pitch: f64,
     /// Field of view.
     pub opening: Opening,
@@ -20,14 +20,14 @@ pub struct Pose {
 /// Field of view, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Opening {
-    /// From the left to the right border.
+    /// Angle between the left and the right border of the picture.
     Horizontal(f64),
-    /// From the upper to the lower border.
+    /// Angle between the upper and the lower border of the picture.
     Vertical(f64),
 }
 
 impl Pose {
-    /// The view from here.
+    /// Returns the view for a picture of `size` (x, y) pixels, with the near plane at `near` metres.
     pub fn view(&self, size: [u32; 2], near: f64, tolerance: Tolerance) -> View {
         let fov_x = match self.opening {
             Opening::Horizontal(degrees) => degrees.to_radians(),

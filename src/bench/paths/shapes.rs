@@ -1,4 +1,5 @@
-//! The shapes of the paths. Lengths follow the field's extent: a path over two samples is a path all the same.
+//! The camera paths `circle`, `skim`, `corner`, `spin`, `zoom`, `dive`, `hover` and `teleport`. Their lengths scale
+//! with the field, so that they work on fields of any size. [`PATHS`](super::PATHS) describes each.
 
 use std::f64::consts::TAU;
 
@@ -7,26 +8,29 @@ use glam::DVec3;
 use super::ground::Ground;
 use super::pose::{Opening, Pose};
 
-/// Field of view where a path does not say otherwise.
+/// Default field of view.
 const OPENING: Opening = Opening::Horizontal(60.0);
+/// Wide horizontal field of view, degrees.
 const WIDE: f64 = 90.0;
+/// Narrow horizontal field of view, degrees.
 const NARROW: f64 = 3.0;
 
-/// 0 at the first frame, 1 at the last.
+/// Returns the parameter of each frame on an open path: 0 at the first frame, 1 at the last.
 pub(super) fn along(frames: usize) -> impl Iterator<Item = f64> {
     (0..frames).map(move |k| if frames > 1 { k as f64 / (frames - 1) as f64 } else { 0.0 })
 }
 
-/// 0 at the first frame, 1 at the frame after the last: a path that closes.
+/// Returns the parameter of each frame on a closed path: 0 at the first frame, 1 one step after the last.
 fn around(frames: usize) -> impl Iterator<Item = f64> {
     (0..frames).map(move |k| k as f64 / frames as f64)
 }
 
+/// Returns the point `clearance` metres above the ground at a world position (x, z).
 fn above(ground: &Ground, at: [f64; 2], clearance: f64) -> DVec3 {
     DVec3::new(at[0], ground.height(at) + clearance, at[1])
 }
 
-/// Heading and pitch, degrees, of a direction.
+/// Returns heading (0 = east, 90 = south) and pitch of a direction, degrees.
 pub(super) fn angles(direction: DVec3) -> (f64, f64) {
     let level = direction.x.hypot(direction.z);
     (direction.z.atan2(direction.x).to_degrees(), direction.y.atan2(level).to_degrees())
@@ -58,7 +62,7 @@ pub fn corner(ground: &Ground, frames: usize) -> Vec<Pose> {
     let yaw = angles(DVec3::new(way.0, 0.0, way.1)).0;
     let pose = |t: f64| {
         let [x, z] = at(t);
-        // Between the samples of the way there may be higher land.
+        // The ground may be higher between the examined points.
         let y = (top + ground.altitude()).max(ground.height([x, z]) + ground.eye_height());
         Pose { eye: DVec3::new(x, y, z), yaw, pitch: -20.0 - 40.0 * t, opening: OPENING }
     };
@@ -71,7 +75,7 @@ pub fn spin(ground: &Ground, frames: usize) -> Vec<Pose> {
     around(frames).map(|turn| Pose { eye, yaw: 360.0 * turn, pitch: -10.0, opening }).collect()
 }
 
-/// Towards the summit, from the corner farthest from it.
+/// Zooms in on the summit from the corner farthest from it.
 pub fn zoom(ground: &Ground, frames: usize) -> Vec<Pose> {
     let summit = ground.summit();
     let distance = |at: &[f64; 2]| (at[0] - summit[0]).hypot(at[1] - summit[1]);
@@ -96,8 +100,8 @@ pub fn dive(ground: &Ground, frames: usize) -> Vec<Pose> {
     along(frames).map(pose).collect()
 }
 
-/// A tenth of the altitude back and forth along the view, five times: whatever switches at a distance within that
-/// tenth switches ten times.
+/// Moves back and forth along the view five times, by a tenth of the altitude. A level of detail that switches within
+/// this distance switches ten times.
 pub fn hover(ground: &Ground, frames: usize) -> Vec<Pose> {
     let start = above(ground, ground.place(0.4, 0.5), ground.altitude());
     let pose = |t: f64| {
@@ -108,14 +112,15 @@ pub fn hover(ground: &Ground, frames: usize) -> Vec<Pose> {
     around(frames).map(|t| lifted(ground, pose(t))).collect()
 }
 
-/// The pose, no lower than eye height.
+/// Raises a pose to eye height if it is lower.
 fn lifted(ground: &Ground, mut pose: Pose) -> Pose {
     let floor = ground.height([pose.eye.x, pose.eye.z]) + ground.eye_height();
     pose.eye.y = pose.eye.y.max(floor);
     pose
 }
 
-/// Places uniform, heights above ground uniform in their logarithm, looking at a place in the inner half of the field.
+/// Chooses a random position in every frame, at a log-uniform height above ground. The eye looks at a random point in
+/// the inner half of the field.
 pub fn teleport(ground: &Ground, frames: usize) -> Vec<Pose> {
     let mut random = Random(1);
     let pose = |_: usize| {
@@ -129,11 +134,12 @@ pub fn teleport(ground: &Ground, frames: usize) -> Vec<Pose> {
     (0..frames).map(pose).collect()
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine and in every version.
+/// SplitMix64 random numbers (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014). They are
+/// implemented here so that paths never change.
 struct Random(u64);
 
 impl Random {
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -22,6 +22,13 @@ pub(super) fn size(len: u64) -> Option<[u32; 2]> {
     SIZES.into_iter().find(|&[w, h]| u64::from(w) * u64::from(h) * 2 == len)
 }
 
+/// Returns the error text for a file that is named as a tile and has the length of none; `None` for other names.
+pub(super) fn wrong_length(name: &str, len: u64) -> Option<String> {
+    let lengths = SIZES.map(|[w, h]| (2 * u64::from(w) * u64::from(h)).to_string()).join(", ");
+    let is_tile = name.to_ascii_lowercase().ends_with(".hgt");
+    is_tile.then(|| format!("expected an SRTM tile of {lengths} bytes, found {len}: it is incomplete or damaged"))
+}
+
 /// Reads a tile.
 pub(super) fn read(input: &mut Input, options: &Options) -> Result<Decoded, Error> {
     let expected = "expected 1201², 3601², 7201² or 1801 x 3601 samples of 2 bytes";

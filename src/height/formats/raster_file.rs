@@ -4,7 +4,7 @@ use super::decoded::Decoded;
 use super::format::{Format, Read, Reader};
 use super::input::{Input, one_band};
 use super::options::Options;
-use super::{raw, sidecar};
+use super::{hgt, raw, sidecar};
 use crate::height::error::Error;
 
 /// Reads a file of one raster, and the files beside it.
@@ -17,7 +17,10 @@ pub(super) fn read(input: &mut Input, format: Option<&'static Format>, options: 
 }
 
 fn read_only_band(input: &mut Input, format: Option<&'static Format>, options: &Options) -> Result<Decoded, Error> {
-    let Some(format) = format else { return Err(input.error("content", raw::hint(input.len))) };
+    let Some(format) = format else {
+        let wrong_length = hgt::wrong_length(input.name, input.len);
+        return Err(input.error("content", wrong_length.unwrap_or_else(|| raw::hint(input.len))));
+    };
     match &format.read {
         Some(Read::One(read) | Read::Bands(read)) => decode(input, format.name, *read, options),
         Some(Read::Beside { .. }) => Err(no_data(input)),

@@ -5,6 +5,7 @@ pub(super) mod crs;
 pub(super) mod crs_text;
 pub(super) mod ellipsoid;
 pub(super) mod epsg;
+pub(super) mod extent;
 pub(super) mod mercator;
 pub(super) mod place;
 pub(super) mod registry;

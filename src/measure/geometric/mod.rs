@@ -1,15 +1,14 @@
-//! Distance of the drawn triangles from the samples: vertically in metres, and on the screen in pixels.
+//! Errors of the drawn triangles: vertical distances from the samples in metres, and distances on the screen in pixels.
 //!
-//! Measured is every sample with data inside or on the border of a drawn triangle, if the drawn point above
-//! or below it is in view. The screen error is exact: both end points of the vertical difference are projected
-//! in f64. The near plane only says what is drawn: a true point that lies before it is projected through the
-//! pinhole all the same, and only at or behind the eye, where it has no image, is the error infinite. (The
-//! certified metric bounds the error of such points too, see [`View::allowed_error`].)
+//! A sample with data is measured against each drawn triangle that contains it, if the drawn point above or below it is
+//! in view. The screen error is the distance between the projections of both points, in f64. A sample before the near
+//! plane is projected too; the error is infinite only if the sample lies at or behind the eye. The certified metric
+//! covers such points ([`View::allowed_error`]).
 //!
-//! Each sample counts once: of the triangles around a sample, the one on its south-east side (at the field's
-//! last column and row, on its west and north side) counts it, chosen exactly on the integers. A sample at the
-//! south or east border of the drawn land inside the field, which has no such triangle, counts towards the
-//! maximum only; every triangle does.
+//! Statistics count each sample once, in the triangle to its south-east. At the field's last column or row it is the
+//! triangle to its west or north. The choice is exact, in integers. Maxima take all triangles that contain the sample.
+//! Where drawn terrain ends inside the field, samples on its south and east border have no such triangle, and affect
+//! maxima only.
 
 mod silhouette;
 
@@ -30,9 +29,9 @@ use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::view::{Aabb, Containment, Frustum, Projected, View};
 use glam::DVec3;
 
-/// Number of bins of the angle off the view axis: a perspective picture ends before 90°.
+/// Number of bins of the angle off the view axis, which is below 90° in a perspective picture.
 pub const ANGLES: usize = 9;
-/// Width of such a bin, degrees.
+/// Width of a bin, degrees.
 pub const ANGLE_DEG: f64 = 10.0;
 
 /// Screen error divided by the tolerance, in one range of angles off the view axis.
@@ -56,34 +55,34 @@ pub struct AngleBin {
 /// Errors of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Samples measured.
+    /// Number of samples counted.
     pub samples: u64,
-    /// Vertical distance of the drawn surface from the sample, metres.
+    /// Vertical distance between a sample and the drawn surface, metres.
     pub vertical_m: Summary,
-    /// Distance of the same two points on the screen, pixels.
+    /// Distance of these two points on the screen, pixels.
     pub screen_px: Summary,
-    /// Share of the samples whose screen error is at most the view's tolerance; 1 without samples.
+    /// Share of the samples whose screen error is at most the view's tolerance, 0 to 1; 1 without samples.
     pub bound_kept: f64,
-    /// Samples in the silhouette band.
+    /// Number of samples on silhouettes.
     pub silhouette_samples: u64,
-    /// Screen error in the silhouette band, pixels. A sample lies in the band if some of the four triangles that it
-    /// makes with a neighbour along x and one along z face the eye and others do not.
+    /// Screen error of samples on silhouettes, pixels. A sample is on a silhouette if, of the four triangles that it
+    /// forms with one neighbour along x and one along z, some face the eye and others do not.
     pub silhouette_px: Summary,
-    /// Samples by the angle of the drawn point off the view axis: bin k spans [`ANGLE_DEG`]·k to [`ANGLE_DEG`]·(k + 1).
-    /// All rays of an orthographic view are in bin 0.
+    /// Number of samples by the angle of the drawn point off the view axis. Bin k spans [`ANGLE_DEG`]·k to
+    /// [`ANGLE_DEG`]·(k + 1). All samples of an orthographic view are in bin 0.
     pub off_axis_samples: [u64; ANGLES],
     /// Screen error divided by the view's tolerance, in the same bins.
     pub off_axis: [Summary; ANGLES],
-    /// Place of the largest vertical error; `None` if nothing is in view or no error is above 0.
+    /// Sample with the largest vertical error; `None` if no sample in view has an error above 0.
     pub vertical_at: Option<Place>,
-    /// Place of the largest screen error.
+    /// Sample with the largest screen error; `None` as above.
     pub screen_at: Option<Place>,
 }
 
-/// Measures the triangles of a list; in a cave, those that face down against its ceiling.
+/// Measures the triangles of a draw list. In a cave, triangles that face down are compared with the ceiling.
 ///
-/// Time is linear in triangles and samples. Memory is bounded by a few thousandths of the field's samples for each of 64
-/// parallel parts.
+/// The time is linear in triangles and samples. Each of up to 64 parallel parts stores at most a few thousandths of the
+/// field's samples.
 pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) -> Errors {
     let ruler = Ruler::new(field, view, list.fraction_bits);
     let mut total = ruler.tallies();
@@ -91,13 +90,14 @@ pub fn errors(field: &Field, view: &View, resident: &Geometry, list: &DrawList) 
     total.errors(view.tolerance.px)
 }
 
-/// Sums over samples.
+/// Statistics of the samples so far.
 struct Tallies {
     vertical: Tally,
     screen: Tally,
-    /// Counted samples beyond the tolerance.
+    /// Number of samples whose screen error exceeds the tolerance.
     beyond: u64,
     silhouette: Tally,
+    /// Screen errors by the angle off the view axis.
     off_axis: [Tally; ANGLES],
 }
 
@@ -126,7 +126,7 @@ impl Tallies {
     }
 }
 
-/// Data for measuring triangles.
+/// Measures triangles in one view.
 struct Ruler<'a> {
     field: &'a Field,
     /// Reference for triangles that face up.
@@ -138,11 +138,11 @@ struct Ruler<'a> {
     frame: Frame,
     frustum: Frustum,
     projection: Projection,
-    /// Squared cosines of the angles where bins meet.
+    /// Squared cosines of the angles at which bins end, but the last one.
     bin_ends: [f64; ANGLES - 1],
 }
 
-/// The surface that should be there.
+/// The samples that triangles are compared with: those of the floor or of the ceiling.
 struct Truth<'a> {
     field: &'a Field,
     silhouette: Silhouette<'a>,
@@ -182,6 +182,7 @@ impl<'a> Ruler<'a> {
         }
     }
 
+    /// Measures the triangles of a part of the list.
     fn part(&self, resident: &Geometry, list: &DrawList, part: &Draw) -> Tallies {
         let mut tallies = self.tallies();
         expand::visit_draw(self.field, &self.frame, resident, list, part, &mut |triangle: &Drawn| {
@@ -191,6 +192,7 @@ impl<'a> Ruler<'a> {
         tallies
     }
 
+    /// Measures the samples in a triangle.
     fn triangle(&self, truth: &Truth, triangle: &Triangle, tallies: &mut Tallies) {
         let bits = self.fraction_bits;
         if self.frustum.contains(&bounds(self.field, triangle, bits)) == Containment::Outside {
@@ -214,6 +216,7 @@ impl<'a> Ruler<'a> {
         });
     }
 
+    /// Adds a sample, whose drawn point is at `at` on the screen. `counts` is true if this triangle counts the sample.
     fn sample(&self, place: Place, at: &Projected, counts: bool, tallies: &mut Tallies) {
         let error_px = self.projection.distance_px(at, place.truth);
         tallies.vertical.add((place.drawn.y - place.truth.y).abs(), counts, place);
@@ -222,29 +225,31 @@ impl<'a> Ruler<'a> {
         tallies.beyond += u64::from(counts && error_px > self.tolerance_px);
     }
 
+    /// Returns the bin of a point's angle off the view axis.
     fn angle_bin(&self, point: DVec3, at: &Projected) -> usize {
         let squared_cosine = self.projection.squared_cosine(point, at);
         self.bin_ends.iter().filter(|&&end| squared_cosine <= end).count()
     }
 }
 
-/// The box around a triangle, world metres.
+/// Returns the bounding box of a triangle, world metres.
 fn bounds(field: &Field, triangle: &Triangle, fraction_bits: u32) -> Aabb {
     let [a, b, c] = triangle.each_ref().map(|corner| surface::world(field, corner, fraction_bits));
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
 }
 
-/// Returns true if a triangle counts a sample inside it or on its border.
+/// Returns true if a triangle counts the sample (x, z), which lies inside it or on its border.
 ///
-/// Of all triangles around a sample, that one holds the sample moved by (ε, ε²) towards the inside of the field, for an
-/// infinitely small ε. Corners have `fraction_bits` fraction bits.
+/// Of all triangles that contain a sample, the one counts it that also contains the sample moved by (ε, ε²) for an
+/// infinitely small ε: to the south-east, or towards the inside of the field at its last column and row (`last`).
+/// Positions of corners have `fraction_bits` fraction bits.
 pub(super) fn owns(triangle: &Triangle, fraction_bits: u32, [x, z]: [i32; 2], last: [i32; 2]) -> bool {
     let towards = [if x < last[0] { 1 } else { -1 }, if z < last[1] { 1 } else { -1 }];
     let [a, b, c] = *triangle;
     let sample = Corner { x: x << fraction_bits, z: z << fraction_bits, y: 0.0 };
     [[sample, b, c], [sample, c, a], [sample, a, b]].iter().all(|side| {
         let [_, p, q] = *side;
-        // Growth of the side's doubled area with x and with z.
+        // Derivatives of the doubled area with respect to x and z of the sample.
         let (along_x, along_z) = ((q.z - p.z) * towards[0], (p.x - q.x) * towards[1]);
         (doubled_area(side), along_x, along_z) > (0, 0, 0)
     })

@@ -1,4 +1,4 @@
-//! The silhouette band: samples where the terrain turns away from the eye.
+//! Finds samples on silhouettes, where the terrain turns away from the eye.
 
 use glam::DVec3;
 
@@ -6,14 +6,16 @@ use crate::height::Field;
 use crate::measure::summary::Place;
 use crate::view::{Lens, View};
 
-/// Test for the silhouette band of a field in a view.
+/// Test for silhouettes of a field in a view.
 pub struct Silhouette<'a> {
     field: &'a Field,
+    /// Last column and row.
     last: [u32; 2],
-    /// Samples a metre along x and z.
+    /// Samples per metre along x and z.
     per_metre: [f64; 2],
     is_perspective: bool,
     eye: DVec3,
+    /// Direction towards the eye in an orthographic view.
     backward: DVec3,
 }
 
@@ -26,17 +28,18 @@ impl<'a> Silhouette<'a> {
         Self { field, last, per_metre, is_perspective, eye: view.eye, backward: -view.forward() }
     }
 
-    /// Returns true if the silhouette passes through the sample.
+    /// Returns true if a sample is on a silhouette: if some of the planes through it face the eye and others do not.
     ///
-    /// A plane through the sample with slopes (a, b) along x and z faces an eye at (u, y, v) from it if
-    /// y − a·u − b·v > 0. Each slope is one of two, towards either neighbour, or the only one at the field's border.
-    /// Holes count as filled.
+    /// A plane with slopes (a, b) along x and z faces an eye at (u, y, v) relative to the sample if y − a·u − b·v > 0.
+    /// Each slope is that towards one of the two neighbours on its axis, or the only one at the field's border. In
+    /// holes the filling counts.
     pub fn passes(&self, place: &Place) -> bool {
         let to_eye = if self.is_perspective { self.eye - place.truth } else { self.backward };
         let [x, z] = place.sample;
         let here = place.truth.y;
         let rise = |x, z| f64::from(self.field.height(x, z)) - here;
-        // Rises towards the east and the south, as far as the way to the eye is long.
+        // Slopes multiplied by the distance to the eye along their axis: a·u towards west and east, b·v towards north
+        // and south.
         let west = (x > 0).then(|| -rise(x - 1, z) * self.per_metre[0] * to_eye.x);
         let east = (x < self.last[0]).then(|| rise(x + 1, z) * self.per_metre[0] * to_eye.x);
         let north = (z > 0).then(|| -rise(x, z - 1) * self.per_metre[1] * to_eye.z);

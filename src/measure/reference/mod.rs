@@ -1,17 +1,17 @@
-//! The near-optimal reference: how few triangles could hold a field within a vertical error, seen from anywhere.
+//! Near-optimal reference meshes: about how few triangles approximate a whole field within a vertical error.
 //!
-//! Two meshes of the whole field, refined until their true largest error, measured over every sample by
-//! [`surface::deviation`], is within what was asked:
+//! Two meshes are refined until their largest vertical error over all samples ([`surface::deviation`]) is within the
+//! given one:
 //!
-//! - *greedy*: the Delaunay triangulation to which the worst sample is added again and again, the greedy insertion
-//!   of M. Garland and P. S. Heckbert, "Fast Polygonal Approximation of Terrains and Height Fields" (1995);
-//! - *RTIN*: the coarsest conforming mesh of the right-triangle hierarchy of W. Evans, D. Kirkpatrick and
-//!   G. Townsend, "Right-Triangulated Irregular Networks" (2001), here not by an estimate of errors but by the
-//!   errors themselves (`reference/rtin.rs`): what any technique on that hierarchy could do at best.
+//! - *greedy*: a Delaunay triangulation to which the sample with the largest error is added repeatedly. This is the
+//!   greedy insertion of M. Garland and P. S. Heckbert, "Fast Polygonal Approximation of Terrains and Height Fields"
+//!   (1995).
+//! - *RTIN*: the coarsest conforming mesh in the hierarchy of right triangles of W. Evans, D. Kirkpatrick and
+//!   G. Townsend, "Right-Triangulated Irregular Networks" (2001). It uses true errors instead of estimates
+//!   (`reference/rtin.rs`), and is the best that any technique on this hierarchy could do.
 //!
-//! Both mesh the whole rectangle: a hole counts as the land that fills it. The greedy mesh of more than
-//! [`TILE`] cells along a side is made in tiles that size or a little smaller, each by itself: its count is then
-//! a few per cent higher, for the triangles at the seams (measured in the tests).
+//! Both meshes cover the whole rectangle, with holes filled. A field of more than [`TILE`] cells a side is triangulated
+//! greedily in separate tiles. The triangles at the seams then increase the number by a few per cent, as tests measure.
 
 mod rtin;
 
@@ -23,10 +23,10 @@ use super::{extended, facing_up};
 use crate::height::surface::{self, Corner, Triangle};
 use crate::height::{Block, Field, Holes, Samples};
 
-/// Most cells along a side of a greedy mesh.
+/// Largest number of cells along a side of a tile.
 pub const TILE: u32 = 1024;
 
-/// Near-optimal meshes of a whole field within a vertical error, and a technique against them.
+/// Near-optimal meshes of a whole field within a vertical error, and comparison of a technique with them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct Reference {
@@ -34,40 +34,44 @@ pub struct Reference {
     pub error_m: f64,
     /// Triangles of the greedy Delaunay mesh.
     pub delaunay: Option<u64>,
-    /// Triangles of the right-triangulated irregular network.
+    /// Triangles of the coarsest mesh of right triangles (RTIN).
     pub rtin: Option<u64>,
-    /// The technique's triangles over the greedy mesh's, both over the terrain in view.
+    /// The technique's triangles in view, divided by those of the greedy mesh in view (estimated by the share of
+    /// samples in view).
     pub multiple: Option<f64>,
 }
 
-/// A mesh within an error.
+/// Size and error of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mesh {
-    /// Triangles.
+    /// Number of triangles.
     pub triangles: u64,
-    /// Its true largest vertical error at a sample, metres.
+    /// Largest vertical error at a sample, metres.
     pub max_error_m: f64,
-    /// Pieces, along x and z, that were meshed each by itself.
+    /// Number of tiles along (x, z) that were triangulated separately.
     pub tiles: [u32; 2],
 }
 
-/// Reason for a missing reference.
+/// Reason why a mesh cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The error asked for, metres, cannot be one.
+    /// The given error, metres, is not positive and finite.
     #[error("near-optimal mesh: vertical error: expected more than 0 m and finite, found {0} m")]
     Tolerance(f64),
-    /// The triangulation broke down.
+    /// The triangulation of a tile failed.
     #[error("near-optimal mesh: tile at sample {at:?}: {what}")]
     Tile {
-        /// The tile's first sample.
+        /// First sample of the tile (x, z).
         at: [u32; 2],
-        /// Description of the fault.
+        /// Description of the failure.
         what: String,
     },
 }
 
-/// The greedy Delaunay mesh within `tolerance_m` metres.
+/// Builds the greedy Delaunay mesh within a vertical error of `tolerance_m` metres.
+///
+/// # Errors
+/// If the error is not positive and finite, or the triangulation fails.
 pub fn greedy(field: &Field, tolerance_m: f64) -> Result<Mesh, Error> {
     check(tolerance_m)?;
     let [columns, rows] = field.size().map(|n| seams(n - 1));
@@ -84,7 +88,10 @@ pub fn greedy(field: &Field, tolerance_m: f64) -> Result<Mesh, Error> {
     })
 }
 
-/// The coarsest mesh of right triangles within `tolerance_m` metres.
+/// Builds the coarsest mesh of right triangles within a vertical error of `tolerance_m` metres.
+///
+/// # Errors
+/// If the error is not positive and finite.
 pub fn rtin(field: &Field, tolerance_m: f64) -> Result<Mesh, Error> {
     check(tolerance_m)?;
     let whole = field.clone().without_holes();
@@ -97,13 +104,13 @@ fn check(tolerance_m: f64) -> Result<(), Error> {
     if allowed { Ok(()) } else { Err(Error::Tolerance(tolerance_m)) }
 }
 
-/// Returns the cuts of a side with this many cells: even pieces of at most [`TILE`] cells.
+/// Divides a side of this many cells evenly into tiles of at most [`TILE`] cells. Returns their ends.
 fn seams(cells: u32) -> Vec<u32> {
     let pieces = cells.div_ceil(TILE);
     (0..=pieces).map(|k| (u64::from(cells) * u64::from(k) / u64::from(pieces)) as u32).collect()
 }
 
-/// A rectangle of samples, both ends inclusive.
+/// A rectangle of samples (x, z), both ends inclusive.
 struct Tile<'a> {
     field: &'a Field,
     first: [u32; 2],
@@ -115,8 +122,8 @@ impl Tile<'_> {
         [0, 1].map(|k| (self.last[k] - self.first[k]) as usize + 1)
     }
 
-    /// Triangles and their true largest error. The triangulation's own error is checked and never trusted: a
-    /// lower one is asked for until the true one is low enough.
+    /// Triangulates the tile. Returns the number of triangles and their largest vertical error, metres. The error of
+    /// the result is measured, and if it is too large, the triangulation is repeated with a smaller one.
     fn greedy(&self, tolerance_m: f64) -> Result<(u64, f64), Error> {
         let (whole, [width, height]) = (self.filled(), self.size());
         let heights: Vec<f64> = (0..width * height).map(|k| f64::from(whole.samples().height(k))).collect();
@@ -138,7 +145,7 @@ impl Tile<'_> {
         }
     }
 
-    /// The samples as a field of their own, without holes.
+    /// Returns the tile as a field with its holes filled.
     fn filled(&self) -> Field {
         let size = [0, 1].map(|k| self.last[k] - self.first[k] + 1);
         let mut heights = Vec::new();
@@ -148,8 +155,8 @@ impl Tile<'_> {
     }
 }
 
-/// The largest vertical error of a mesh, metres; `None` if it does not cover the field once, which it does if its
-/// triangles are turned one way and their areas add up to the field's.
+/// Returns the largest vertical error of a mesh, metres; `None` if it does not cover the field exactly once. For that,
+/// all triangles must have the same winding, and the sum of their areas must be that of the field.
 fn true_error(field: &Field, mesh: &[Triangle]) -> Option<f64> {
     let areas: Vec<i64> = mesh.iter().map(surface::doubled_area).collect();
     let cells: i64 = field.size().iter().map(|&n| i64::from(n) - 1).product();

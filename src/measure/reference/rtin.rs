@@ -1,20 +1,22 @@
-//! The coarsest conforming mesh of right triangles within an error.
+//! Builds the coarsest conforming mesh of right triangles within a vertical error.
 //!
-//! The hierarchy: a square of 2^n cells around the field is two right triangles; a triangle is split at the
-//! midpoint of its base, together with the one on the other side of the base. So a mesh is the set of the
-//! midpoints at which it is split, and each midpoint needs the two before it: the apexes of the two triangles.
+//! The hierarchy starts with a square of 2^n cells that contains the field, divided into two right triangles. A
+//! triangle is split at the midpoint of its base (the hypotenuse), together with the triangle on the other side of the
+//! base. A mesh is thus given by the set of its split points. A split point requires those at the apexes of its two
+//! triangles.
 //!
-//! Every split that is made is needed by every mesh of the hierarchy within the error: a triangle is split if its
-//! own true error is too large, and whenever it is the other half of one that is. So the mesh is the coarsest.
+//! A triangle is split only if its true error is too large, or if another split requires it. All splits are therefore
+//! necessary in every mesh of the hierarchy within the error, and the result is the coarsest.
 //!
-//! Beyond the field's last column and row heights go on as they are there, and neither samples nor triangles
-//! count.
+//! Beyond the field's last column and row, heights are those of the border. Samples and triangles there are not
+//! counted.
 
 use crate::height::Field;
 use crate::height::surface::{self, Corner, Triangle, doubled_area};
 use crate::measure::facing_up;
 
-/// Triangles of the mesh, and its largest error, metres. The field has no holes.
+/// Returns the number of triangles of the coarsest mesh and its largest vertical error, metres. The field must not have
+/// holes.
 pub fn coarsest(field: &Field, tolerance_m: f64) -> (u64, f64) {
     let mesh = Rtin::refined(field, tolerance_m);
     let (mut count, mut largest) = (0, 0.0f64);
@@ -25,18 +27,20 @@ pub fn coarsest(field: &Field, tolerance_m: f64) -> (u64, f64) {
     (count, largest)
 }
 
+/// A mesh of the hierarchy. Triangles are given as \[apex, base, base\], positions as (x, z) in samples.
 struct Rtin<'a> {
     field: &'a Field,
     /// Cells along a side of the square.
     side: i32,
+    /// Last column and row of the field.
     last: [i32; 2],
     tolerance_m: f64,
-    /// A bit for each position of the square at which triangles are split.
+    /// One bit per position of the square: 1 at split points.
     split: Vec<u64>,
 }
 
 impl<'a> Rtin<'a> {
-    /// Split until every triangle is within the error.
+    /// Builds the coarsest mesh whose triangles are all within the error.
     fn refined(field: &'a Field, tolerance_m: f64) -> Self {
         let cells = field.size().map(|n| n - 1);
         let side = cells[0].max(cells[1]).next_power_of_two() as i32;
@@ -52,14 +56,15 @@ impl<'a> Rtin<'a> {
         mesh
     }
 
-    /// Asks for the splits that one at a position needs, before it and after it.
+    /// Adds to `pending` the split points that the one at `at` requires, and those of the four triangles that it
+    /// creates, where their error is too large.
     fn follow(&self, at: [i32; 2], pending: &mut Vec<[i32; 2]>) {
         let (before, after) = around(at, self.side);
         pending.extend(before.into_iter().filter(|&p| self.is_inside(p) && !self.is_corner(p)));
         (0..4).for_each(|k| self.demand([at, after[k], after[(k + 1) % 4]], pending));
     }
 
-    /// Asks for the split of a triangle [apex, base, base] if it is beyond the error.
+    /// Adds the split point of a triangle to `pending` if its error is too large.
     fn demand(&self, triangle: [[i32; 2]; 3], pending: &mut Vec<[i32; 2]>) {
         if triangle.iter().all(|&p| self.is_inside(p))
             && let Some(at) = midpoint(triangle)
@@ -69,7 +74,7 @@ impl<'a> Rtin<'a> {
         }
     }
 
-    /// Triangles on the field that are not split, [apex, base, base].
+    /// Calls `visit` for each triangle of the mesh that covers part of the field.
     fn visit(&self, mut visit: impl FnMut([[i32; 2]; 3])) {
         let mut open = roots(self.side).to_vec();
         while let Some(triangle) = open.pop() {
@@ -82,7 +87,7 @@ impl<'a> Rtin<'a> {
         }
     }
 
-    /// The largest distance of a triangle from the field's samples in it, metres.
+    /// Returns the largest vertical distance of a triangle from the field's samples in it, metres.
     fn error(&self, triangle: [[i32; 2]; 3]) -> f64 {
         let triangle = facing_up(&triangle.map(|at| self.corner(at)));
         if triangle.iter().all(|corner| corner.x <= self.last[0] && corner.z <= self.last[1]) {
@@ -97,12 +102,14 @@ impl<'a> Rtin<'a> {
         largest
     }
 
+    /// Returns the corner at a position with its height.
     fn corner(&self, [x, z]: [i32; 2]) -> Corner {
         let y = self.field.height(x.min(self.last[0]) as u32, z.min(self.last[1]) as u32);
         Corner { x, z, y }
     }
 
-    /// Returns true if some of a triangle's area lies on the field: no side of either separates them.
+    /// Returns true if a triangle overlaps the field's rectangle. By the separating axis theorem, they overlap unless a
+    /// side of either separates them.
     fn meets_field(&self, triangle: [[i32; 2]; 3]) -> bool {
         let at = |[x, z]: [i32; 2]| Corner { x, z, y: 0.0 };
         let [a, b, c]: Triangle = facing_up(&triangle.map(at));
@@ -130,7 +137,7 @@ impl<'a> Rtin<'a> {
         self.split[word] & bit != 0
     }
 
-    /// Returns true if the position was not marked before.
+    /// Marks a split point. Returns true if it was not marked before.
     fn mark(&mut self, at: [i32; 2]) -> bool {
         let (word, bit) = self.bit(at);
         let new = self.split[word] & bit == 0;
@@ -139,30 +146,30 @@ impl<'a> Rtin<'a> {
     }
 }
 
-/// The two triangles of the square, [apex, base, base].
+/// Returns the two triangles of the square.
 fn roots(side: i32) -> [[[i32; 2]; 3]; 2] {
     [[[0, side], [side, side], [0, 0]], [[side, 0], [0, 0], [side, side]]]
 }
 
-/// The midpoint of a triangle's base; `None` if that is a side or a diagonal of a cell.
+/// Returns the midpoint of a triangle's base; `None` if the base is a side or a diagonal of a cell, which is not split.
 fn midpoint([_, a, b]: [[i32; 2]; 3]) -> Option<[i32; 2]> {
     let sum = [a[0] + b[0], a[1] + b[1]];
     (sum[0] % 2 == 0 && sum[1] % 2 == 0).then_some(sum.map(|n| n / 2))
 }
 
-/// Around a midpoint: the apexes of the two triangles split there, and the corners of the square that they make
-/// up, in order. Some may lie outside.
+/// Returns the apexes of the two triangles that are split at a point, and the corners of the square that both form, in
+/// order. Some may lie outside the mesh.
 fn around([x, z]: [i32; 2], side: i32) -> ([[i32; 2]; 2], [[i32; 2]; 4]) {
     let step = 1 << (x | z | side).trailing_zeros();
     let straight = [[x + step, z], [x, z + step], [x - step, z], [x, z - step]];
     let aslant = [[x - step, z - step], [x + step, z - step], [x + step, z + step], [x - step, z + step]];
     match [x / step % 2, z / step % 2] {
-        // The middle of a cell; its diagonals alternate as in `height::rtin`.
+        // The centre of a square. Diagonals alternate as in `height::rtin`.
         [1, 1] => {
             let parity = (x + z - 2 * step) / (2 * step) % 2;
             (if parity == 0 { [aslant[1], aslant[3]] } else { [aslant[0], aslant[2]] }, aslant)
         }
-        // On a side along x.
+        // The midpoint of a side along x.
         [1, _] => ([straight[1], straight[3]], straight),
         _ => ([straight[0], straight[2]], straight),
     }
@@ -177,7 +184,7 @@ mod tests {
     use crate::view::{Lens, Metric, Tolerance, View};
     use glam::DVec3;
 
-    /// Land with one spike: what is split there needs splits all around.
+    /// A flat field with one spike, which requires splits all around it.
     fn spike(side: u32, at: [u32; 2]) -> Field {
         let height = |k: u32| if [k % side, k / side] == at { 10.0 } else { 0.0 };
         let heights = (0..side * side).map(height).collect();

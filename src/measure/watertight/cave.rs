@@ -1,12 +1,13 @@
-//! Proof that a floor and a ceiling close a cave: each is one surface, and they end in common edges.
+//! Proves that a floor and a ceiling enclose a cave: each is one surface, and they share their border edges.
 //!
-//! The steps of [`prove_cave`], each exact:
+//! [`prove_cave`] verifies exactly:
 //!
-//! 1. the triangles that face up, and those that face down turned over, each pass steps 1 to 5 of the
-//!    [module](super): one surface, covered once;
-//! 2. both lie over the same triangles in plan, and no vertex of the ceiling is below the floor's;
-//! 3. where a triangle has no neighbour, floor and ceiling have the same edge: the same two ends in space. Elsewhere the
-//!    cave is open, and that may be at the rim of the field only, or out of view.
+//! 1. Triangles that face up form one surface, by steps 1 to 5 of the [parent module](super). So do those that face
+//!    down, after turning them over.
+//! 2. In plan view, both surfaces consist of the same triangles, and no vertex of the ceiling is below that of the
+//!    floor.
+//! 3. Border edges of floor and ceiling have the same ends in space. Where they differ, the cave is open. This is
+//!    allowed only at the border of the field and out of view.
 
 use super::counter_example::{CounterExample, Kind, refuted};
 use super::edges::{self, BorderEdge};
@@ -20,20 +21,20 @@ use crate::view::{Aabb, Containment, Frustum};
 /// Result of a cave's proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CaveProof {
-    /// Triangles of the floor, and as many of the ceiling.
+    /// Number of triangles of the floor; the ceiling has as many.
     pub pairs: usize,
-    /// Twice the area in plan, samples².
+    /// Twice the area of the floor in plan view, samples².
     pub doubled_area: i64,
-    /// Edges in which floor and ceiling meet.
+    /// Number of border edges that floor and ceiling share.
     pub seam_edges: usize,
-    /// Edges at which the cave is open: at the field's rim or out of view.
+    /// Number of border edges at which the cave is open: at the border of the field or out of view.
     pub open_edges: usize,
 }
 
-/// Proves that triangles are a floor and a ceiling that close what is between them. `field` says where samples lie.
+/// Proves that triangles are the floor and the ceiling of a cave, enclosing the space between them.
 ///
 /// # Errors
-/// The triangles that refute it.
+/// If they do not; the error has the triangles at fault.
 ///
 /// # Panics
 /// As [`super::prove`].
@@ -60,14 +61,14 @@ pub fn prove_cave(field: &Field, frustum: &Frustum, triangles: &[Drawn]) -> Resu
     Ok(CaveProof { pairs: surfaces[0].len(), doubled_area, seam_edges, open_edges: low.len() - seam_edges })
 }
 
-/// A triangle's corners in plan in an order of their own.
+/// Returns a triangle's corners in plan view in ascending order, to compare and sort triangles.
 fn in_plan(triangle: &Drawn) -> [u64; 3] {
     let mut corners = triangle.corners.map(|c| edges::packed([c.x, c.z]));
     corners.sort_unstable();
     corners
 }
 
-/// The border of what is one surface.
+/// Proves that triangles are one surface, and returns its border.
 fn one_surface(field: &Field, triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
     on_the_field(field, triangles, 0)?;
     faces_up(triangles)?;
@@ -78,7 +79,8 @@ fn one_surface(field: &Field, triangles: &[Drawn]) -> Result<Vec<BorderEdge>, Bo
     Ok(border)
 }
 
-/// Refuted if a triangle of one surface has none of the other over it, or is above it somewhere.
+/// Fails if floor and ceiling do not consist of the same triangles in plan view, or the ceiling is below the floor.
+/// Both lists are sorted by [`in_plan`].
 fn one_over_the_other([floor, ceiling]: &[Vec<Drawn>; 2]) -> Result<(), Box<CounterExample>> {
     let differ = floor.iter().zip(ceiling).position(|(low, high)| in_plan(low) != in_plan(high));
     let first = differ.or((floor.len() != ceiling.len()).then_some(floor.len().min(ceiling.len())));
@@ -94,7 +96,7 @@ fn one_over_the_other([floor, ceiling]: &[Vec<Drawn>; 2]) -> Result<(), Box<Coun
     }
 }
 
-/// A border by its edges in plan, with the heights of both ends.
+/// Sorts a border by its edges in plan view, and adds the heights of their ends.
 fn sorted(triangles: &[Drawn], border: Vec<BorderEdge>) -> Vec<(BorderEdge, [Corner; 2])> {
     let corner = |edge: &BorderEdge, [x, z]: [i32; 2]| {
         let corners = triangles[edge.triangle as usize].corners;
@@ -102,12 +104,12 @@ fn sorted(triangles: &[Drawn], border: Vec<BorderEdge>) -> Vec<(BorderEdge, [Cor
     };
     let mut ends: Vec<_> =
         border.into_iter().map(|edge| (edge, [corner(&edge, edge.from), corner(&edge, edge.to)])).collect();
-    // Each directed edge occurs once, and the other surface has the same ones.
+    // Each directed edge occurs once, and the borders of both surfaces have the same edges.
     ends.sort_unstable_by_key(|(edge, _)| (edge.from, edge.to));
     ends
 }
 
-/// Returns true if a cave may be open at an edge: at the field's rim, or out of view.
+/// Returns true if a cave may be open at an edge: at the border of the field, or out of view.
 fn is_open(field: &Field, frustum: &Frustum, below: &[Corner; 2], above: &[Corner; 2]) -> bool {
     let last = field.size().map(|n| n as i32 - 1);
     let is_rim = |n: [i32; 2], last: i32| n == [0; 2] || n == [last; 2];

@@ -1,4 +1,4 @@
-//! Refutations of a proof.
+//! Counter-examples: triangles that show why a surface is not watertight.
 
 use crate::draw::expand::Drawn;
 use crate::height::surface::Triangle;
@@ -10,26 +10,26 @@ pub enum Kind {
     Outside,
     /// A triangle faces down.
     Fold,
-    /// One vertex has two heights.
+    /// A vertex has different heights in two triangles.
     Crack,
-    /// Land is covered more than once.
+    /// Triangles overlap in plan view.
     Overlap,
     /// A vertex of one triangle lies inside an edge of another.
     TJunction,
-    /// Terrain with data, perhaps in view, is not covered.
+    /// Terrain with data that may be in view is not covered.
     Gap,
-    /// One edge lies above another, and no skirt hides what is between them.
+    /// One edge lies above another, and no skirt covers the gap between them.
     Seam,
 }
 
-/// The fewest triangles that show what is wrong.
+/// A fault of a surface, with the few triangles that show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CounterExample {
-    /// Description of the fault.
+    /// Kind of the fault.
     pub kind: Kind,
-    /// The triangles at fault, as they were given; for a gap the samples' one that is missing.
+    /// The triangles at fault. For a gap, the triangle of the samples' surface that is missing.
     pub triangles: Vec<Triangle>,
-    /// Description of the fault and its place.
+    /// Description of the fault and its position.
     pub text: String,
 }
 
@@ -44,7 +44,7 @@ impl std::fmt::Display for CounterExample {
 
 impl std::error::Error for CounterExample {}
 
-/// A refutation by some of the triangles.
+/// Returns a counter-example with the triangles whose numbers are `guilty`.
 pub(super) fn refuted<T>(
     kind: Kind,
     triangles: &[Drawn],

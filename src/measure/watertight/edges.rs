@@ -1,4 +1,4 @@
-//! Edges of triangles: which are shared, which make the border, and whether the border is clean.
+//! Edges of triangles: finds those at the border of a surface, and T-junctions between them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -7,20 +7,20 @@ use rayon::prelude::*;
 use super::counter_example::{CounterExample, Kind, refuted};
 use crate::draw::expand::Drawn;
 
-/// An edge of a triangle that no other triangle uses the other way round. The land is to the left of it, seen
-/// from above with north up: an edge that runs south has it to the east.
+/// An edge that only one triangle has. Seen from above, the triangle lies to its left: an edge that runs south has its
+/// triangle to the east.
 #[derive(Clone, Copy, Debug)]
 pub struct BorderEdge {
-    /// Start.
+    /// Lattice position of the start.
     pub from: [i32; 2],
-    /// End.
+    /// Lattice position of the end.
     pub to: [i32; 2],
-    /// Its triangle.
+    /// Number of the triangle.
     pub triangle: u32,
 }
 
-/// An edge with its triangle as one number, which sorts fast: from the top the two ends as [`packed`], the
-/// direction (0 from the smaller end to the greater), the triangle (31 bits).
+/// An edge and its triangle in one integer, which sorts fast. From the highest bits on: both ends, [`packed`], the
+/// smaller one first; the direction, 0 from the smaller end to the greater; the number of the triangle (31 bits).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Edge(u128);
 
@@ -54,18 +54,21 @@ impl Edge {
     }
 }
 
-/// A lattice position in 48 bits.
+/// Packs a lattice position into 48 bits. Coordinates are from 0 to 2^24 − 1.
 pub fn packed([x, z]: [i32; 2]) -> u64 {
     (x as u64) << 24 | z as u64
 }
 
-/// The lattice position in the last 48 bits.
+/// Unpacks a lattice position from the lowest 48 bits.
 pub fn unpacked(bits: u64) -> [i32; 2] {
     [24, 0].map(|shift| (bits >> shift & 0xff_ffff) as i32)
 }
 
-/// The edges without a partner, and pairs that are not `joined`: by the triangles of both, and the edge's ends.
-/// Refuted if a directed edge occurs twice.
+/// Returns the border edges of a surface: edges of one triangle only, and both edges of a pair for which `joined`
+/// returns false. `joined` gets the numbers of the two triangles and the ends of their common edge.
+///
+/// # Errors
+/// If an edge occurs twice in the same direction.
 pub fn border(
     triangles: &[Drawn],
     joined: impl Fn([u32; 2], [[i32; 2]; 2]) -> bool,
@@ -96,7 +99,10 @@ fn edges_of(k: u32, triangle: &Drawn) -> [Edge; 3] {
     [Edge::new(a, b, k), Edge::new(b, c, k), Edge::new(c, a, k)]
 }
 
-/// Refuted if an end of a border edge lies strictly inside another border edge.
+/// Proves that no end of a border edge lies inside another border edge.
+///
+/// # Errors
+/// If one does: a T-junction.
 pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), Box<CounterExample>> {
     let ends: HashMap<_, _> = border.iter().flat_map(|e| [(e.from, e.triangle), (e.to, e.triangle)]).collect();
     for edge in border {
@@ -113,10 +119,11 @@ pub fn no_t_junction(triangles: &[Drawn], border: &[BorderEdge]) -> Result<(), B
     Ok(())
 }
 
-/// Converts a border with fraction bits to samples: consecutive edges in one direction become one.
+/// Merges consecutive border edges of the same direction into lines between samples, and converts positions with
+/// fraction bits to samples.
 ///
 /// # Errors
-/// If a line of the border does not go from sample to sample.
+/// If such a line does not start and end at a sample.
 pub fn between_samples(
     triangles: &[Drawn],
     border: Vec<BorderEdge>,
@@ -126,7 +133,7 @@ pub fn between_samples(
         let along = [0, 1].map(|k| edge.to[k] - edge.from[k]);
         along.map(|n| n / gcd(along[0].unsigned_abs(), along[1].unsigned_abs()) as i32)
     };
-    // Two edges may leave one place, in two directions: where two parts of the border touch.
+    // Two edges may start at the same position in different directions, where parts of the border touch.
     let next: HashMap<_, _> = border.iter().map(|edge| ((edge.from, direction(edge)), edge)).collect();
     let entered: HashSet<_> = border.iter().map(|edge| (edge.to, direction(edge))).collect();
     let starts = border.iter().filter(|edge| !entered.contains(&(edge.from, direction(edge))));
@@ -146,6 +153,7 @@ pub fn between_samples(
     starts.map(whole_line).collect()
 }
 
+/// Returns the greatest common divisor.
 pub fn gcd(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { gcd(b, a % b) }
 }

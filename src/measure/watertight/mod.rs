@@ -1,24 +1,25 @@
-//! Proof that the drawn triangles are one surface, on the integer lattice, without rounding; or the triangles
-//! that refute it.
+//! Proves that the drawn triangles are one watertight surface, exactly, on the integer lattice of the samples.
+//! Otherwise returns triangles that show the fault.
 //!
-//! In plan, let m be the number of triangles over a point. The steps of [`prove`], each exact:
+//! Let m be the number of triangles that cover a point in plan view. [`prove`] verifies exactly:
 //!
-//! 1. every corner lies on the field, and every triangle faces up;
-//! 2. every lattice vertex has one height, to the bit, in all triangles around it;
-//! 3. every directed edge occurs once. An edge used in both directions joins two triangles, and m is the same
-//!    on both sides of it; the others make up the border;
-//! 4. no vertex of the border lies strictly inside an edge of the border: no T-junction. By 2 to 4 triangles
-//!    that touch along a line share whole edges with the same ends in space: no crack;
-//! 5. m is 0 outside the field and changes across the border only. A sweep over the rows follows the border
-//!    and shows that m is 0 or 1 everywhere: covered once, and the drawn area is the covered area;
-//! 6. where m is 0, every triangle of the samples' own surface that has data is outside the frustum: nothing
-//!    in view is left out. The test is [`Frustum::contains`] on the triangle's own box: culling by boxes around the
-//!    terrain passes, and culling of anything visible does not.
+//! 1. Every corner lies on the field, and every triangle faces up.
+//! 2. Every vertex has the same height, bit by bit, in all triangles around it.
+//! 3. Every directed edge occurs once. An edge that occurs in both directions joins two triangles, and m is equal on
+//!    both sides of it. All other edges form the border.
+//! 4. No vertex of the border lies inside an edge of the border: there are no T-junctions. By 2 to 4, triangles that
+//!    touch along a line share whole edges with the same ends in space: there are no cracks.
+//! 5. Since m is 0 outside the field and changes only across the border, a sweep along the border over all rows proves
+//!    that m is 0 or 1 everywhere: no point is covered twice.
+//! 6. Where m is 0, every triangle of the samples' surface with data is outside the frustum, by [`Frustum::contains`]
+//!    of its bounding box: nothing in view is missing. Culling by larger boxes passes, culling of visible terrain does
+//!    not.
 //!
-//! What lies along a culled region or a hole is thus no matter of the border's shape but of what is missing
-//! beyond it. In a view of everything all land must be covered, and [`Proof::doubled_area`] is the field's.
+//! The border around culled terrain and holes may thus have any shape. If the whole field is in view, all of it must be
+//! covered, and [`Proof::doubled_area`] is twice the area of the field.
 //!
-//! Surfaces with skirts have gaps between edges, which [`prove_with_skirts`] finds and shows hidden instead of 2 to 4.
+//! Surfaces with skirts have gaps between edges. [`prove_with_skirts`] replaces steps 2 to 4 by a proof that skirts
+//! cover these gaps.
 
 pub mod cave;
 pub mod counter_example;
@@ -42,21 +43,24 @@ use self::vertices::{faces_up, on_the_field, one_height_a_vertex};
 /// Result of a proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proof {
-    /// Triangles.
+    /// Number of triangles.
     pub triangles: usize,
-    /// Twice the land covered, in samples²; that of a cave by its floor.
+    /// Twice the covered area in plan view, samples²; of a cave, that of its floor.
     pub doubled_area: i64,
-    /// Edges with a triangle on one side only; with skirts, their parts from sample to sample.
+    /// Number of border edges; with skirts, of their parts from sample to sample.
     pub border_edges: usize,
 }
 
-/// Proves that triangles are one surface that leaves out nothing in view. Needs about 100 bytes a triangle.
+/// Proves that triangles are one surface without gaps in view. Needs about 100 bytes per triangle.
 ///
-/// Corners have `fraction_bits` fraction bits. If there are any, the border must consist of straight lines between
-/// samples; vertices may lie anywhere on these lines.
+/// Positions have `fraction_bits` fraction bits. If there are any, the border must consist of straight lines between
+/// samples, on which vertices may lie anywhere.
+///
+/// # Errors
+/// If they are not; the error has the triangles at fault.
 ///
 /// # Panics
-/// If there are more than 2^31 triangles, or more than 2^24 parts of samples a side.
+/// If there are more than 2^31 triangles, or a side has more than 2^24 positions.
 pub fn prove(
     field: &Field,
     frustum: &Frustum,
@@ -77,7 +81,7 @@ pub fn prove(
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
 }
 
-/// The border, in samples, of triangles that are one surface but perhaps for land covered twice.
+/// Verifies steps 1 to 4, and returns the border in samples.
 fn one_surface(
     field: &Field,
     triangles: &[Drawn],
@@ -91,8 +95,11 @@ fn one_surface(
     if fraction_bits == 0 { Ok(border) } else { edges::between_samples(triangles, border, fraction_bits) }
 }
 
-/// Proves that triangles are one surface but for gaps between edges one above the other, each of which is hidden by a
-/// skirt; and that they leave out nothing in view. `skirts` are upright triangles ([`expand::skirts`]).
+/// Proves that triangles are one surface without gaps in view, except for gaps between edges above each other that
+/// skirts cover. `skirts` are upright triangles ([`expand::skirts`]).
+///
+/// # Errors
+/// As [`prove`].
 ///
 /// # Panics
 /// As [`prove`].
@@ -112,7 +119,11 @@ pub fn prove_with_skirts(
     Ok(Proof { triangles: triangles.len(), doubled_area, border_edges: border.len() })
 }
 
-/// The proof of a list whose meshes are said to meet in this way, expanded in this view: up to where it reaches.
+/// Proves that the triangles of a draw list are watertight in a view, up to the list's draw distance. `seams` is the
+/// way in which the technique joins its meshes.
+///
+/// # Errors
+/// As [`prove`].
 ///
 /// # Panics
 /// As [`prove`].
@@ -139,7 +150,10 @@ pub fn prove_list(
     }
 }
 
-/// Writes triangles, whose corners have `fraction_bits` fraction bits, as ASCII PLY, world metres.
+/// Writes triangles as ASCII PLY in world metres. Positions have `fraction_bits` fraction bits.
+///
+/// # Errors
+/// If writing fails.
 pub fn write_ply(field: &Field, triangles: &[Triangle], fraction_bits: u32, mut out: impl Write) -> io::Result<()> {
     writeln!(out, "ply\nformat ascii 1.0\ncomment metres: x east, y up, z south")?;
     writeln!(out, "element vertex {}", 3 * triangles.len())?;

@@ -1,11 +1,12 @@
-//! Gaps between edges, and the skirts that hide them.
+//! Proves that skirts cover the gaps between edges that lie above each other.
 //!
-//! All edges but those that two triangles share with both ends in space are cut at the samples they pass. Two parts over
-//! the same way, one forth and one back, are a seam: there m is the same on both sides, as where an edge is shared.
-//! The others make up the border. Between its two ends everything that lies over a part is straight, so that what
-//! holds at both ends holds at every point between. Where one side of a seam is higher, upright triangles that face
-//! away from it must cover the way down to the other side: the first begins at the edge, to the bit, each further
-//! one where the one before it ends. At a sample without data nothing is drawn, and there seams may gape.
+//! Edges that two triangles do not share in space are cut at the samples on them. Two parts over the same segment, one
+//! in each direction, form a seam: as at a shared edge, the number of covering triangles is equal on both sides. All
+//! other parts form the border. Heights are linear along a segment, so it suffices to compare them at its two ends.
+//!
+//! Where one side of a seam is higher, skirts that face away from it must cover the gap down to the other side. The
+//! first skirt must start at the upper edge, bit by bit, and each further one where the previous one ends. At samples
+//! without data nothing is drawn, and gaps are allowed.
 
 use rayon::prelude::*;
 
@@ -15,33 +16,36 @@ use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, Triangle};
 
-/// The way from one sample to the next one on a line, the smaller position first, as [`edges::packed`].
+/// A segment between adjacent samples on a line, as [`edges::packed`] positions, the smaller one first.
 type Way = [u64; 2];
 
-/// Heights at the two ends of a way, metres.
+/// Heights at the two ends of a segment, metres.
 type Heights = [f64; 2];
 
-/// Part of an edge.
+/// Part of an edge over one segment.
 #[derive(Clone, Copy)]
 struct Part {
     way: Way,
-    /// True if the edge runs the other way.
+    /// True if the edge runs from the greater position to the smaller one.
     is_backward: bool,
     heights: Heights,
     triangle: u32,
 }
 
-/// Part of an upright triangle.
+/// Part of a skirt, an upright triangle, over one segment.
 #[derive(Clone, Copy)]
 struct Wall {
     way: Way,
-    /// Of the edge that it hangs from, if it faces away from it.
+    /// Direction of the edge that this side of the skirt belongs to, as in [`Part`].
     is_backward: bool,
     top: Heights,
     bottom: Heights,
 }
 
-/// The parts of edges that lie along nothing else. Refuted if land is covered twice along an edge, or a seam gapes.
+/// Returns the border: the parts of edges that are neither shared nor part of a seam.
+///
+/// # Errors
+/// If triangles overlap along an edge, or skirts do not cover a seam.
 pub fn border(field: &Field, triangles: &[Drawn], skirts: &[Drawn]) -> Result<Vec<BorderEdge>, Box<CounterExample>> {
     let joined = |of: [u32; 2], ends: [[i32; 2]; 2]| {
         let [a, b] = of.map(|k| ends.map(|end| corner_at(&triangles[k as usize].corners, end).y.to_bits()));
@@ -69,7 +73,7 @@ pub fn border(field: &Field, triangles: &[Drawn], skirts: &[Drawn]) -> Result<Ve
     Ok(border)
 }
 
-/// Refuted if the upper part is above the lower one and no skirt of it reaches down to that.
+/// Proves that skirts cover the gap where `upper` is above `lower`. `walls` are sorted by segment and direction.
 fn hidden(
     field: &Field,
     triangles: &[Drawn],
@@ -108,7 +112,8 @@ fn corner_at(triangle: &Triangle, at: [i32; 2]) -> Corner {
     *triangle.iter().find(|corner| [corner.x, corner.z] == at).expect("an end of one of its edges")
 }
 
-/// The ways along a line between two corners, with its heights there. The same for both directions, to the bit.
+/// Returns the segments of the line between two corners, with the line's heights. Both directions give the same values,
+/// bit by bit.
 fn along(a: Corner, b: Corner) -> impl Iterator<Item = (Way, Heights)> {
     let packed = |corner: Corner| edges::packed([corner.x, corner.z]);
     let [low, high] = if packed(a) < packed(b) { [a, b] } else { [b, a] };
@@ -129,16 +134,17 @@ fn parts(triangles: &[Drawn], edge: &BorderEdge) -> impl Iterator<Item = Part> +
     along(a, b).map(move |(way, heights)| Part { way, is_backward, heights, triangle })
 }
 
-/// The parts of an upright triangle with two corners one above the other; none of another one.
+/// Returns the parts of an upright triangle with two corners above each other; none for other triangles.
 fn walls(triangle: &Triangle) -> impl Iterator<Item = Wall> + use<> {
     let [a, b, c] = *triangle;
     let above = |p: &Corner, q: &Corner| (p.x, p.z) == (q.x, q.z);
-    // Two corners in one place, in the order of the winding, and then the third.
+    // The two corners above each other in the order of the winding, then the third.
     let pairs = [[a, b, c], [b, c, a], [c, a, b]].into_iter().find(|[p, q, _]| above(p, q));
     pairs.into_iter().flat_map(|[p, q, far]| {
         let (upper, lower) = if p.y > q.y { (p, q) } else { (q, p) };
         let [here, there] = [p, far].map(|corner| edges::packed([corner.x, corner.z]));
-        // Down here and on to there, it faces to the right of that way: it hangs from an edge that goes there.
+        // If the winding goes down at `here` and then to `there`, the triangle faces to the right of that direction,
+        // away from an edge that runs in it.
         let is_backward = (p.y > q.y) != (here < there);
         let lines = along(upper, far).zip(along(lower, far));
         lines.map(move |((way, top), (_, bottom))| Wall { way, is_backward, top, bottom })

@@ -1,5 +1,5 @@
-//! A sweep from north to south over the bands between two rows of samples. No vertex lies inside a band: there
-//! the border is a row of straight lines that cut the covered land into trapezoids.
+//! Sweeps from north to south over the bands between adjacent rows of samples. No vertex of the border lies inside a
+//! band, so the border consists of straight lines there, which bound trapezoids of covered terrain.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -13,19 +13,19 @@ use crate::height::surface::{Corner, is_terrain};
 use crate::height::{Field, rtin};
 use crate::view::{Aabb, Containment, Frustum};
 
-/// Part of the covered land: what lies in a band between two lines.
+/// A trapezoid of covered terrain in one band.
 #[derive(Clone, Copy, Debug)]
 pub struct Strip {
-    /// The band between rows `band` and `band + 1`.
+    /// The band, between rows `band` and `band + 1`.
     pub band: i32,
     west: Line,
     east: Line,
 }
 
-/// Intersections of a line with the band's northern and southern row.
+/// A line in a band, by the columns at which it meets the northern and the southern row.
 type Line = [Fraction; 2];
 
-/// An exact number.
+/// An exact rational number.
 #[derive(Clone, Copy, Debug)]
 struct Fraction {
     numerator: i64,
@@ -70,18 +70,20 @@ impl PartialEq for Fraction {
 
 impl Eq for Fraction {}
 
-/// A border edge in a band.
+/// The part of a border edge in one band.
 #[derive(Clone, Copy)]
 struct Crossing {
     band: i32,
     line: Line,
-    /// True if terrain begins east of it.
+    /// True if covered terrain lies to its east.
     enters: bool,
     triangle: u32,
 }
 
-/// Cuts the land inside the border into strips, sorted by band and from west to east. Refuted if any of it is
-/// covered twice: border lines that cross, or two that enter in a row.
+/// Divides the terrain inside a border into strips, sorted by band and from west to east.
+///
+/// # Errors
+/// If terrain is covered twice: border lines cross, or two in a row have covered terrain to the same side.
 pub fn strips(triangles: &[Drawn], border: &[BorderEdge]) -> Result<Vec<Strip>, Box<CounterExample>> {
     let mut crossings: Vec<Crossing> = border.iter().flat_map(crossings).collect();
     crossings.par_sort_unstable_by_key(|c| (c.band, c.line, !c.enters, c.triangle));
@@ -106,7 +108,7 @@ pub fn strips(triangles: &[Drawn], border: &[BorderEdge]) -> Result<Vec<Strip>, 
     Ok(strips)
 }
 
-/// The border edge band by band; none if it runs along a row.
+/// Returns the parts of a border edge in each band; none if it runs along a row.
 fn crossings(edge: &BorderEdge) -> impl Iterator<Item = Crossing> + use<> {
     let &BorderEdge { from, to, triangle } = edge;
     let (north, south) = if from[1] < to[1] { (from, to) } else { (to, from) };
@@ -119,10 +121,13 @@ fn crossings(edge: &BorderEdge) -> impl Iterator<Item = Crossing> + use<> {
     (north[1]..south[1]).map(move |band| Crossing { band, line: [at(band), at(band + 1)], enters, triangle })
 }
 
-/// Open cells looked at together before each by itself.
+/// Number of adjacent cells that are tested for visibility together, before each of them is.
 const RUN: i32 = 64;
 
-/// Fails if terrain with data that may be in view is not covered.
+/// Proves that all terrain with data that may be in view is covered by the strips, which are sorted by band.
+///
+/// # Errors
+/// If some is not; the error has a missing triangle of the samples' surface.
 pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), Box<CounterExample>> {
     let bands = 0..field.size()[1] as i32 - 1;
     let missing = bands.into_par_iter().find_map_first(|band| {
@@ -143,7 +148,7 @@ pub fn no_gap(field: &Field, frustum: &Frustum, strips: &[Strip]) -> Result<(), 
     Err(Box::new(CounterExample { kind: Kind::Gap, triangles: vec![corners], text }))
 }
 
-/// Cells of a band that are not wholly inside one of its strips.
+/// Returns the cells of a band that are not wholly inside one of its strips, in ranges of at most [`RUN`] cells.
 fn open_runs(field: &Field, strips: &[Strip]) -> impl Iterator<Item = Range<i32>> {
     let last = field.size()[0] as i32 - 1;
     let ends = strips.iter().map(Strip::whole_cells).chain([(last, last)]);
@@ -156,13 +161,14 @@ fn open_runs(field: &Field, strips: &[Strip]) -> impl Iterator<Item = Range<i32>
 }
 
 impl Strip {
-    /// The cells `first..end` that lie wholly inside.
+    /// Returns the range of cells that lie wholly inside.
     fn whole_cells(&self) -> (i32, i32) {
         let [west, east] = [self.west[0].max(self.west[1]).ceil(), self.east[0].min(self.east[1]).floor()];
         (west as i32, east.max(west) as i32)
     }
 
-    /// Returns true if a triangle with corners on the two rows lies inside: strips are convex, so its corners decide.
+    /// Returns true if a triangle with corners on the band's two rows lies inside. As strips are convex, it suffices to
+    /// test the corners.
     fn contains(&self, triangle: &[[i32; 2]; 3]) -> bool {
         triangle.iter().all(|&[x, z]| {
             let row = (z - self.band) as usize;
@@ -171,7 +177,7 @@ impl Strip {
     }
 }
 
-/// Returns true if the box around samples is at least partly inside the frustum.
+/// Returns true if the bounding box of some samples is at least partly inside the frustum.
 fn may_be_seen(field: &Field, frustum: &Frustum, samples: impl IntoIterator<Item = [i32; 2]>) -> bool {
     let points = samples.into_iter().map(|[x, z]| field.world(x as u32, z as u32));
     let bounds = points.map(|p| Aabb { min: p, max: p }).reduce(|a, b| a.union(&b));

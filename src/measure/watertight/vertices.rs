@@ -1,4 +1,5 @@
-//! Properties of single triangles and vertices: inside the field, facing up, one height each.
+//! Proves properties of single triangles and vertices: triangles lie on the field and face up, vertices have one
+//! height.
 
 use rayon::prelude::*;
 
@@ -8,6 +9,7 @@ use crate::draw::expand::Drawn;
 use crate::height::Field;
 use crate::height::surface::{Corner, doubled_area};
 
+/// Proves that all corners lie on the field. Positions have `fraction_bits` fraction bits.
 pub(super) fn on_the_field(field: &Field, triangles: &[Drawn], fraction_bits: u32) -> Result<(), Box<CounterExample>> {
     let [w, h] = field.size().map(|n| n as i32);
     let [last_x, last_z] = [w, h].map(|n| (n - 1) << fraction_bits);
@@ -18,6 +20,7 @@ pub(super) fn on_the_field(field: &Field, triangles: &[Drawn], fraction_bits: u3
     }
 }
 
+/// Proves that all triangles face up and have an area in plan view.
 pub(super) fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
     match triangles.iter().position(|t| doubled_area(&t.corners) <= 0) {
         Some(k) => refuted(Kind::Fold, triangles, [k as u32], "a triangle that does not face up".into()),
@@ -25,8 +28,9 @@ pub(super) fn faces_up(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
     }
 }
 
+/// Proves that each vertex has the same height, bit by bit, in all triangles that share it.
 pub(super) fn one_height_a_vertex(triangles: &[Drawn]) -> Result<(), Box<CounterExample>> {
-    // Position, height, triangle as one number, which sorts fast.
+    // Position, height and triangle in one integer, which sorts fast.
     let vertex = |corner: Corner, k: u32| {
         let position = u128::from(edges::packed([corner.x, corner.z]));
         position << 64 | u128::from(corner.y.to_bits()) << 32 | u128::from(k)
