@@ -50,7 +50,7 @@ impl fmt::Display for Goal {
     }
 }
 
-/// How well the frames of a path met their goal. A frame meets the goal if its cost is within 5 % of it.
+/// Deviation of the frames of a path from their goal. A frame meets the goal if its cost is within 5 % of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(transform = extended::non_negative)]
 pub struct BudgetStats {

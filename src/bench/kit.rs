@@ -103,7 +103,7 @@ mod tests {
         assert_eq!((WARM_UP, SIZE), (20, [1280, 720]));
     }
 
-    /// Pins the list by its FNV-1a hash: whoever changes a scene must also increase [`VERSION`].
+    /// Pins the list by its FNV-1a hash. A change of a scene also requires an increase of [`VERSION`].
     #[test]
     fn a_change_of_the_list_needs_another_version() {
         let text = format!("{SCENES:?} {WARM_UP} {SIZE:?} {REAL_PATHS:?}");

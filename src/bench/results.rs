@@ -91,7 +91,7 @@ pub struct TimeSummary {
     #[serde(with = "extended", default = "unscaled")]
     #[schemars(with = "Extended", extend("minimum" = 1))]
     pub tolerance_scale: f64,
-    /// How well the frames met the case's goal; `null` without a goal.
+    /// Deviation of the frames from the case's goal; `null` without a goal.
     #[serde(default)]
     pub budget: Option<BudgetStats>,
     /// Device memory in use, all purposes together, bytes: the largest of any round.

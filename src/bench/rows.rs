@@ -200,7 +200,7 @@ pub struct Times {
     /// Number of frames with such instances.
     #[serde(default)]
     pub pending_frames: usize,
-    /// How well the frames met the case's goal; `null` without a goal.
+    /// Deviation of the frames from the case's goal; `null` without a goal.
     #[serde(default)]
     pub budget: Option<BudgetStats>,
     /// Tolerance of every frame, pixels, in order; empty without a goal.

@@ -26,7 +26,7 @@ pub struct BenchArgs {
     /// Action on finished benchmarks, instead of measuring.
     #[command(subcommand)]
     pub action: Option<Action>,
-    /// What to measure.
+    /// Fields, techniques, tolerances and paths to measure.
     #[command(flatten)]
     pub measure: MeasureArgs,
 }

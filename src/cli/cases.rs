@@ -194,7 +194,7 @@ fn combinations(common: &Common, spec: &TechniqueSpec, choices: &[(String, Strin
     all.into_iter().map(checked).collect()
 }
 
-/// Adds the fields and flights of the kit, or those whose name contains one of the texts `only`.
+/// Adds the fields and flights of the kit, or only scenes with one of the texts `only` in their name.
 fn of_kit(
     common: &Common,
     only: &[String],

@@ -23,7 +23,7 @@ const TITLE: f64 = 26.0;
 const LEGEND: f64 = 18.0;
 
 /// Colours of the series on a white background: the palette of Okabe and Ito (2008), which colour-blind readers can
-/// distinguish. Yellow is left out, as it is too light.
+/// distinguish. Yellow is left out because it is too light.
 pub const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555"];
 /// Markers of the series as SVG paths around (0, 0).
 const MARKERS: [&str; 7] = [

@@ -41,7 +41,7 @@ type Column = (&'static str, fn(&CaseResult) -> Option<String>);
 /// test.
 fn overdraw(result: &CaseResult) -> Option<String> {
     let economy = result.errors.as_ref()?.economy.as_ref()?;
-    let passed = economy.passed.map(|passed| format!(" <small>{} pass depth test</small>", number(passed)));
+    let passed = economy.passed.map(|passed| format!(" <small>{} pass</small>", number(passed)));
     Some(number(economy.overdraw?) + &passed.unwrap_or_default())
 }
 
@@ -57,7 +57,7 @@ const TIMES: &[Column] = &[
     ("max, ms", |r| r.time.as_ref().map(|t| number(t.frame_max_ms))),
     ("hitches, %", |r| r.time.as_ref().map(|t| number(t.hitches_percent))),
     ("triangles", |r| r.time.as_ref().map(|t| number(t.triangles))),
-    ("triangles / near-optimal", |r| r.errors.as_ref()?.reference?.multiple.map(number)),
+    ("near-optimal ×", |r| r.errors.as_ref()?.reference?.multiple.map(number)),
     ("hidden, %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.hidden_share))),
     ("below 1 px², %", |r| Some(number(100.0 * r.errors.as_ref()?.economy.as_ref()?.subpixel_share))),
     ("overdraw", overdraw),
@@ -73,7 +73,7 @@ const ERRORS: &[Column] = &[
     ("p99.9, px", |r| r.errors.as_ref().map(|e| number(e.error_px.p999))),
     ("rms, px", |r| r.errors.as_ref().map(|e| number(e.error_px.rms))),
     ("max, m", |r| r.errors.as_ref().map(|e| number(e.error_m.max))),
-    ("silhouette max, px", |r| r.errors.as_ref()?.silhouette_px.map(|s| number(s.max))),
+    ("outline max, px", |r| r.errors.as_ref()?.silhouette_px.map(|s| number(s.max))),
     ("frames within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.frames))),
     ("samples within, %", |r| r.errors.as_ref()?.within.map(|w| number(100.0 * w.samples))),
     ("pop p99, px", |r| r.errors.as_ref()?.pop.as_ref().map(|p| number(p.p99_px))),
@@ -83,8 +83,8 @@ const ERRORS: &[Column] = &[
     ("hole pixels", |r| r.errors.as_ref()?.hole_pixels.map(|n| n.to_string())),
     ("skirt pixels", |r| r.errors.as_ref()?.skirt_pixels.map(|n| n.to_string())),
     ("frames pending", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| w.frames.to_string())),
-    ("pending: pixels beyond", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| w.pixels.to_string())),
-    ("pending: max excess, px", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| number(w.excess_px))),
+    ("pixels beyond", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| w.pixels.to_string())),
+    ("excess, px", |r| r.errors.as_ref()?.pending.filter(|w| w.frames > 0).map(|w| number(w.excess_px))),
     ("watertight", |r| r.errors.as_ref()?.watertight.map(|is| if is { "yes" } else { "<b>no</b>" }.to_string())),
 ];
 
@@ -94,8 +94,10 @@ pub fn cases(results: &Results, scene: &str) -> String {
     let base = escape(&results.header.base);
     format!(
         "<h3>Times and costs</h3><p class=\"conditions\">Base: {base}, at the same tolerance where it was measured. \
-         CPU: selection and recording. Small print: bootstrap 95 % intervals.</p>{}\
-         <h3>Errors</h3>{}",
+         CPU: selection and recording. Small print: bootstrap 95 % intervals; for overdraw, the fragments per covered \
+         pixel that pass the depth test.</p>{}\
+         <h3>Errors</h3><p class=\"conditions\">Pending: frames with data that is not on the device yet; in these, the \
+         pixels beyond the tolerance, and the largest excess.</p>{}",
         of_cases(&cases, TIMES),
         of_cases(&cases, ERRORS)
     )
