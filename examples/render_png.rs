@@ -1,6 +1,6 @@
 //! Draws one picture of the terrain that comes with the crate, on any Vulkan device, and writes a PNG file.
 //!
-//! `cargo run --release --example render_png -- [FILE]`
+//! `cargo run --release --example render_png -- [OUTPUT.png]`
 
 use std::error::Error;
 use std::sync::Arc;

@@ -1,9 +1,9 @@
-# How shaderc itself is compiled (see .cargo/config.toml): quickly, since it only runs in build.rs.
+# CMake settings that build shaderc without optimisation, as only build.rs runs it. `.cargo/config.toml` passes this file.
 set(CMAKE_C_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
 set(CMAKE_CXX_FLAGS_RELEASE "-O0 -DNDEBUG" CACHE STRING "")
 set(SKIP_SPIRV_TOOLS_INSTALL ON CACHE BOOL "")
 
-# Once all is declared: leave out what the compiler does not need, and read its largest headers once.
+# After all targets are declared: excludes unneeded ones, and precompiles the largest headers.
 function(cuesta_trim_shaderc)
     foreach(unused SPIRV-Tools-shared SPIRV-Tools-reduce SPIRV-Tools-lint SPIRV-Tools-diff SPIRV-Tools-link)
         if(TARGET ${unused})

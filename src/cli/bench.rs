@@ -11,6 +11,7 @@ use serde::Serialize;
 pub use super::cases::MeasureArgs;
 use super::cases::Planned;
 use super::common::{Common, Outcome};
+use super::comparison::Text;
 use super::{interrupt, report};
 use crate::bench::compare::{THRESHOLD, compare};
 use crate::bench::results::{CaseResult, RESULTS, Results};
@@ -73,7 +74,11 @@ fn run_compare(common: &Common, args: &CompareArgs) -> Result<Outcome> {
     ensure!(share.is_finite() && share >= 0.0, "--threshold {share}: expected 0 or more");
     let comparison = compare(&Results::read(&args.a)?, &Results::read(&args.b)?, share);
     ensure!(comparison.matched > 0, "{}: no case in common with {}", args.b.display(), args.a.display());
-    report::print(common, &comparison)?;
+    if common.json {
+        report::print(common, &comparison)?;
+    } else if !common.quiet {
+        report::say(Text(&comparison))?;
+    }
     Ok(if comparison.regressions.is_empty() { Outcome::Done } else { Outcome::LimitMissed })
 }
 

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod cases;
 pub mod common;
+mod comparison;
 pub mod endless;
 pub mod export;
 pub mod info;

@@ -70,7 +70,7 @@ impl Memory {
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
         let out_of_memory = || format!("out of memory: {} bytes for {purpose}", requirements.size);
-        ensure!(gpu.may_allocate(), "{}, as asked for", out_of_memory());
+        ensure!(gpu.may_allocate(), "{} (limited by --allocations)", out_of_memory());
         let mut allocator = gpu.allocator.lock().unwrap_or_else(|e| e.into_inner());
         let allocation = allocator.allocate(&description).with_context(out_of_memory)?;
         drop(allocator);

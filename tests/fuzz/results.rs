@@ -1,4 +1,5 @@
-//! Rows of benchmarks and stress suites, mutated line by line: results, pages, comparisons and journals of them.
+//! Fuzzes the readers of benchmark and stress rows: mutated rows must give results, reports and comparisons, or an error;
+//! never a panic.
 
 use std::path::Path;
 use std::sync::LazyLock;

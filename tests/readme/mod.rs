@@ -1,4 +1,4 @@
-//! README and the guide list the same techniques, settings and subcommands as the tables.
+//! The techniques, settings and subcommands in README and guide match the tables of the program.
 
 use cuesta::internal::lod::TECHNIQUES;
 
