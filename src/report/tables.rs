@@ -93,9 +93,9 @@ pub fn cases(results: &Results, scene: &str) -> String {
     let cases: Vec<&CaseResult> = results.cases.iter().filter(|result| result.case.scene() == scene).collect();
     let base = escape(&results.header.base);
     format!(
-        "<h3>Times and costs</h3><p class=\"conditions\">× base: divided by the time of {base}, at the same \
-         tolerance where it was measured. CPU: selection and recording. Small print: bootstrap 95 % intervals; for overdraw, the fragments per covered \
-         pixel that pass the depth test.</p>{}\
+        "<h3>Times and costs</h3><p class=\"conditions\">× base: divided by the time of {base}, at the same tolerance \
+         where it was measured. CPU: selection and recording. Small print: bootstrap 95 % intervals; for overdraw, the \
+         fragments per covered pixel that pass the depth test.</p>{}\
          <h3>Errors</h3><p class=\"conditions\">Pending: frames with data that is not on the device yet; in these, the \
          pixels beyond the tolerance, and the largest excess.</p>{}",
         of_cases(&cases, TIMES),
