@@ -48,10 +48,10 @@ fn overdraw(result: &CaseResult) -> Option<String> {
 /// Columns of times and costs.
 const TIMES: &[Column] = &[
     ("frame, ms", |r| r.time.as_ref().map(|t| estimate(&t.frame_ms))),
-    ("frame / base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
-    ("frame / shading only", |r| r.time.as_ref()?.over_shading_only.as_ref().map(estimate)),
+    ("× base", |r| r.time.as_ref()?.over_base.as_ref().map(estimate)),
+    ("× shading only", |r| r.time.as_ref()?.over_shading_only.as_ref().map(estimate)),
     ("CPU, ms", |r| r.time.as_ref().map(|t| estimate(&t.cpu_ms))),
-    ("CPU / base", |r| r.time.as_ref()?.cpu_over_base.as_ref().map(estimate)),
+    ("CPU × base", |r| r.time.as_ref()?.cpu_over_base.as_ref().map(estimate)),
     ("p95, ms", |r| r.time.as_ref().map(|t| number(t.frame_p95_ms))),
     ("p99, ms", |r| r.time.as_ref().map(|t| number(t.frame_p99_ms))),
     ("max, ms", |r| r.time.as_ref().map(|t| number(t.frame_max_ms))),
@@ -93,9 +93,9 @@ pub fn cases(results: &Results, scene: &str) -> String {
     let cases: Vec<&CaseResult> = results.cases.iter().filter(|result| result.case.scene() == scene).collect();
     let base = escape(&results.header.base);
     format!(
-        "<h3>Times and costs</h3><p class=\"conditions\">Base: {base}, at the same tolerance where it was measured. \
-         CPU: selection and recording. Small print: bootstrap 95 % intervals; for overdraw, the fragments per covered \
-         pixel that pass the depth test.</p>{}\
+        "<h3>Times and costs</h3><p class=\"conditions\">× base: divided by the time of {base}, at the same tolerance \
+         where it was measured. CPU: selection and recording. Small print: bootstrap 95 % intervals; for overdraw, the \
+         fragments per covered pixel that pass the depth test.</p>{}\
          <h3>Errors</h3><p class=\"conditions\">Pending: frames with data that is not on the device yet; in these, the \
          pixels beyond the tolerance, and the largest excess.</p>{}",
         of_cases(&cases, TIMES),
