@@ -212,8 +212,8 @@ impl SceneRenderer {
         })
     }
 
-    /// Draws the last list again with a depth buffer and copies that, for a plan without depth. The picture copied before
-    /// stays.
+    /// Draws the last list again with a depth buffer and copies that, for a plan without depth. The picture copied
+    /// before stays.
     fn draw_deep(&mut self, view: &View) -> Result<()> {
         self.offscreen.add_depth(&self.gpu)?;
         self.renderer.add_depth()?;
@@ -244,8 +244,8 @@ impl SceneRenderer {
         Ok(())
     }
 
-    /// Draws the fragment work of the last frame without its triangles: one full-screen pass that reads the depth of the
-    /// last frame. `view` is that frame's.
+    /// Draws the fragment work of the last frame without its triangles: one full-screen pass that reads the depth of
+    /// the last frame. `view` is that frame's.
     ///
     /// # Errors
     /// If the device fails.
@@ -284,8 +284,8 @@ impl SceneRenderer {
         self.offscreen.picture()
     }
 
-    /// Depth of the last frame that copied it, row by row from the top. In a perspective view it is the distance of the near
-    /// plane divided by the distance along the view axis; 0 where there is no terrain.
+    /// Depth of the last frame that copied it, row by row from the top. In a perspective view it is the distance of the
+    /// near plane divided by the distance along the view axis; 0 where there is no terrain.
     pub fn depth(&self) -> Vec<f32> {
         self.offscreen.depth_values()
     }

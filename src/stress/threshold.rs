@@ -17,8 +17,8 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Finds a threshold on the way from above a corner of a field to far outside it. Returns `None` if both ends draw the
-    /// same number of triangles.
+    /// Finds a threshold on the way from above a corner of a field to far outside it. Returns `None` if both ends draw
+    /// the same number of triangles.
     pub fn find(field: &Field, technique: &mut dyn Technique) -> Option<Self> {
         let all = views::views(field);
         let of = |name: &str| all.iter().find(|view| view.0 == name).expect("a common view").1;

@@ -4,8 +4,8 @@
 //!
 //! The distance combines the distance in plan from the eye to the nearest point of a square with the eye's height above
 //! the terrain below it. Levels must rise with the distance, and none may begin within reach of squares that touch one
-//! two levels finer (a Lipschitz condition). Levels that violate it are moved to greater distances. A table is stored as
-//! the entry at which each level begins.
+//! two levels finer (a Lipschitz condition). Levels that violate it are moved to greater distances. A table is stored
+//! as the entry at which each level begins.
 
 use super::blend::Blend;
 use super::splits::Levels;
@@ -31,9 +31,9 @@ impl Steps {
         Self { begins: (0..=max).map(|l| usize::from(l > level)).collect(), scale: 0.0, entries: 1 }
     }
 
-    /// Creates levels that rise by one with each doubling of the distance, for triangles of constant size on the screen.
-    /// Level 1 begins at `unit_m` metres; the maximum is `max`. The table extends further by `more_m` metres, for repairs.
-    /// Scales are powers of four, so a smaller unit never gives a finer level.
+    /// Creates levels that rise by one with each doubling of the distance, for triangles of constant size on the
+    /// screen. Level 1 begins at `unit_m` metres; the maximum is `max`. The table extends further by `more_m` metres,
+    /// for repairs. Scales are powers of four, so a smaller unit never gives a finer level.
     fn doubling(unit_m: f64, max: u32, more_m: f64) -> Self {
         let scale = doubling_scale(unit_m, max, more_m);
         let begin = |level: u32| {
