@@ -74,8 +74,8 @@ pub mod heights {
 pub mod techniques {
     #[doc(inline)]
     pub use crate::internal::lod::{
-        Diagnostics, Entry, Gradual, Need, Omitted, SelectInParts, SelectOnGpu, Setting, Settings, TECHNIQUES, Technique,
-        TechniqueSpec, Techniques, Values, Variant,
+        Diagnostics, Entry, Gradual, Need, Omitted, SelectInParts, SelectOnGpu, Setting, Settings, TECHNIQUES,
+        Technique, TechniqueSpec, Techniques, Values, Variant,
     };
 }
 
