@@ -87,10 +87,11 @@ impl Cli {
     }
 
     fn parse_with(
-        words: impl IntoIterator<Item: Into<OsString> + Clone>,
+        words: impl IntoIterator<Item: Into<OsString>>,
         techniques: &Techniques,
     ) -> Result<Self, clap::Error> {
-        let mut command = technique::with_names(command(), techniques);
+        let words: Vec<OsString> = words.into_iter().map(Into::into).collect();
+        let mut command = technique::with_settings(technique::with_names(command(), techniques), techniques, &words);
         let matches = command.try_get_matches_from_mut(words)?;
         let mut cli = Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
         cli.common.techniques = techniques.clone();

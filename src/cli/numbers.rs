@@ -57,6 +57,13 @@ pub(super) fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Resul
     parts.try_into().map_err(|_| format!("expected {N} numbers separated by commas, found {found}"))
 }
 
+/// Parses two angles, degrees.
+pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
+    let angles = numbers::<f64, 2>(text)?;
+    let is_finite = angles.iter().all(|angle| angle.is_finite());
+    is_finite.then_some(angles).ok_or_else(|| "expected two angles in degrees".to_string())
+}
+
 /// Parses a spacing: one number for both axes, or one along x and one along z, metres. The latter may be negative, as
 /// gdalinfo prints it for rows that run south.
 pub(super) fn spacing(text: &str) -> Result<[f64; 2], String> {

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::common::Common;
-use super::numbers::{FARTHEST_M, LENGTHS, is_length, nodata, numbers, spacing};
+use super::numbers::{FARTHEST_M, LENGTHS, angles, is_length, nodata, numbers, spacing};
 use super::overlay::Picture;
 use super::several::is_demo;
 use super::whole::Whole;
@@ -127,7 +127,7 @@ pub struct LookArgs {
     #[arg(long, value_name = "MB", default_value_t = 1100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub texture_memory: u64,
     /// Azimuth (0 = north, 90 = east) and altitude of the sun, degrees.
-    #[arg(long, value_name = "AZ,ALT", value_parser = numbers::<f64, 2>)]
+    #[arg(long, value_name = "AZ,ALT", value_parser = angles)]
     pub sun: Option<[f64; 2]>,
     /// Optical density of the fog, per metre.
     #[arg(long, value_name = "DENSITY", default_value_t = 0.0)]
@@ -368,13 +368,23 @@ impl ViewArgs {
         if !(self.fov > 0.0 && self.fov < 180.0) {
             bail!("--fov {}: expected degrees between 0 and 180", self.fov);
         }
+        let angles = [("--yaw", self.yaw), ("--pitch", self.pitch), ("--roll", Some(self.roll))];
+        if let Some((flag, Some(angle))) = angles.into_iter().find(|(_, angle)| angle.is_some_and(|a| !a.is_finite())) {
+            bail!("{flag} {angle}: expected degrees");
+        }
         let whole = Whole::of(field, self.fov, self.size);
         let eye = match &self.eye {
             Some(text) => position("--eye", text, field)?,
             None => whole.eye,
         };
         let world_from_eye = match (&self.look, self.yaw, self.pitch) {
-            (Some(text), _, _) => View::looking_along(position("--look", text, field)? - eye) * View::rolled(self.roll),
+            (Some(text), _, _) => {
+                let forward = position("--look", text, field)? - eye;
+                if forward == DVec3::ZERO {
+                    bail!("--look {text}: expected another point than the eye");
+                }
+                View::looking_along(forward) * View::rolled(self.roll)
+            }
             (None, None, None) if self.eye.is_none() => whole.world_from_eye * View::rolled(self.roll),
             (None, yaw, pitch) => View::turned(yaw.unwrap_or(-90.0), pitch.unwrap_or(0.0), self.roll),
         };

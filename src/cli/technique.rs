@@ -1,5 +1,6 @@
 //! Arguments for the technique, its settings and the tolerance.
 
+use std::ffi::OsString;
 use std::sync::Arc;
 
 use anyhow::{Error, Result, anyhow, bail};
@@ -10,7 +11,7 @@ use super::numbers::FINEST;
 use super::report;
 use super::scene::key_value;
 use crate::height::Field;
-use crate::lod::{Entry, Settings, Technique, TechniqueSpec, Techniques};
+use crate::lod::{Entry, Setting, Settings, Technique, TechniqueSpec, Techniques};
 use crate::view::{Metric, Tolerance};
 
 /// Technique, settings and tolerance.
@@ -59,6 +60,35 @@ pub(super) fn with_names(command: Command, techniques: &Techniques) -> Command {
     let names: Vec<_> = command.get_subcommands().filter(takes_one).map(|c| c.get_name().to_string()).collect();
     let listed = |command: Command| command.mut_arg("technique", |arg| arg.help(&help));
     names.into_iter().fold(command, |command, name| command.mut_subcommand(name, listed))
+}
+
+/// Adds the variants and settings of the techniques that a command line names to the help of all subcommands.
+pub(super) fn with_settings(command: Command, techniques: &Techniques, words: &[OsString]) -> Command {
+    let words = words.iter().map(|word| word.to_string_lossy());
+    let named = words.clone().zip(words.skip(1)).filter_map(|(word, next)| match word.strip_prefix("--technique") {
+        Some("") => Some(next.into_owned()),
+        Some(value) => value.strip_prefix('=').map(str::to_owned),
+        None => next.strip_prefix("--technique=").map(str::to_owned),
+    });
+    let specs: Vec<TechniqueSpec> =
+        named.flat_map(|list| list.split(',').map(str::to_owned).collect::<Vec<_>>()).flat_map(|s| s.parse()).collect();
+    let mut entries: Vec<_> = specs.iter().filter_map(|spec| techniques.entry(spec).ok()).collect();
+    entries.dedup_by_key(|entry| entry.name);
+    let text: String = entries.into_iter().map(settings_help).collect();
+    if text.is_empty() { command } else { command.mut_subcommands(|sub| sub.after_help(text.trim_end().to_owned())) }
+}
+
+/// Describes the variants and settings of a technique.
+fn settings_help(entry: &Entry) -> String {
+    let mut text = format!("{}: {}\n", entry.name, entry.about);
+    for variant in entry.variants {
+        text += &format!("  --technique {}:{}\n          {}\n", entry.name, variant.name, variant.about);
+    }
+    for setting in entry.settings {
+        let Setting { key, values, default, about } = setting;
+        text += &format!("  --set {key}=VALUE\n          {about} [{values}; default: {default}]\n");
+    }
+    if entry.settings.is_empty() { text + "  It has no settings.\n" } else { text }
 }
 
 /// Returns the technique that `--technique` names.

@@ -9,6 +9,13 @@
 //!
 //! `examples/embed.rs` is a complete program. The renderer draws no sky, keeps no global state, and destroys only what it
 //! created.
+//!
+//! - World axes: right-handed, x east, y up, z south, metres. [`View::size`] is the viewport in pixels, which may change from
+//!   frame to frame; the lens is a centred perspective or an orthographic one.
+//! - Technique, look and target are fixed: another one needs another renderer. Selection runs on the CPU, also for variants
+//!   that select on the GPU elsewhere.
+//! - There is one pass, of colour and depth. It leaves its own pipeline, descriptor set 0, vertex and index buffers bound.
+//! - Types in the interface are of `ash` 0.38, `gpu-allocator` 0.28, `image` 0.25 and `glam` 0.34.
 
 use crate::draw::{DeviceGeometry, DrawList, PipelineRequirements};
 pub use crate::gpu::embedded::{EmbeddedDescription, EmbeddedTerrain, ListSource};
@@ -37,7 +44,7 @@ pub struct SelectionStats {
     /// kept. Infinite: no tolerance is kept.
     pub tolerance_scale: f64,
     /// Certified bound on the distance of any drawn point from its true place on the screen, pixels. `None` if the technique,
-    /// the metric or the moment does not guarantee one.
+    /// the metric or the moment does not guarantee one, or the selection is that of an earlier view.
     pub error_bound_px: Option<f64>,
     /// Visible pieces that are coarser than the tolerance allows until finer data arrive.
     pub pending: usize,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, ensure};
 use ash::vk;
 
 use super::device::Gpu;
@@ -15,12 +15,15 @@ use super::passes;
 use super::requirements::Requirements;
 use super::slot::Part;
 use super::terrain::{SceneInput, Terrain};
-use crate::draw::{DepthMode, DeviceGeometry, DrawList, PipelineRequirements};
+use crate::draw::{DepthMode, DeviceGeometry, DrawList, PipelineRequirements, Submission};
 use crate::height::Field;
 use crate::plan::{Look, ScenePlan};
 use crate::view::{Aabb, View};
 
 /// Selects the draw lists of one field.
+///
+/// Ranges of indices, instances and vertices in a list, and the targets of its uploads, lie within the list and the geometry
+/// that stays on the device. The renderer does not check them.
 pub trait ListSource {
     /// Fills the (empty) list with the draws of a view.
     fn select(&mut self, view: &View, list: &mut DrawList);
@@ -44,7 +47,7 @@ pub struct EmbeddedDescription<'a, L> {
     pub overlay: Option<&'a image::RgbaImage>,
     /// The caller's attachments.
     pub target: Target,
-    /// Frames whose commands may be under way at once, 1 or more.
+    /// Frames whose commands may be under way at once, 1 to 16.
     pub frames_in_flight: usize,
 }
 
@@ -63,6 +66,8 @@ pub struct EmbeddedTerrain<L> {
     list: DrawList,
     /// The view of the last update.
     view: Option<View>,
+    /// True if the list was selected for that view, false if it is that of an earlier update.
+    is_current: bool,
     /// True once the uploads of the list are recorded.
     is_uploaded: bool,
     /// The frame of the last [`Self::prepare`].
@@ -87,7 +92,10 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     /// # Safety
     /// - The handles are valid, belong together, and stay valid until the renderer is dropped.
     /// - The device has the features of [`Self::requirements`] enabled.
+    /// - A render pass in the target is valid, and has its attachments at that subpass.
     /// - No other thread uses the queue during the call.
+    /// - The lists of the technique keep what [`ListSource`] demands.
+    /// - The device has finished all commands that draw the terrain before the result is dropped.
     pub unsafe fn from_raw(handles: DeviceHandles, description: EmbeddedDescription<L>) -> Result<Self> {
         let EmbeddedDescription { field, technique, look, overlay, target, frames_in_flight } = description;
         let requirements = Self::requirements(&target, &look);
@@ -105,17 +113,32 @@ impl<L: ListSource> EmbeddedTerrain<L> {
         let terrain = Terrain::new(&gpu, scene, technique.device_geometry(), formats)?;
         let passes = PassList::uploads(&gpu, &plan, &terrain, formats)?;
         let (range, list) = (field.range(), DrawList::default());
-        let (view, is_uploaded, frame_index) = (None, false, None);
-        Ok(Self { terrain, passes, technique, field, look, target, range, list, view, is_uploaded, frame_index, gpu })
+        Ok(Self {
+            terrain,
+            passes,
+            technique,
+            field,
+            look,
+            target,
+            range,
+            list,
+            view: None,
+            is_current: false,
+            is_uploaded: false,
+            frame_index: None,
+            gpu,
+        })
     }
 
     /// Selects the terrain of a view, which [`Self::prepare`] and [`Self::draw`] then use.
     ///
     /// An update without a `prepare` after it, as in a frame that was dropped, is allowed. If its selection changes resident
-    /// geometry, the next update keeps that selection and moves only the camera.
+    /// geometry, the next update keeps that selection and moves only the camera: its error in the new view is not bounded.
+    /// After an update, `draw` needs a new `prepare`.
     pub fn update(&mut self, view: &View) {
         let is_pending = self.view.is_some() && !self.is_uploaded && !self.list.uploads.is_empty();
-        self.view = Some(*view);
+        self.is_current = !is_pending || self.view == Some(*view);
+        (self.view, self.frame_index) = (Some(*view), None);
         if is_pending {
             return;
         }
@@ -130,7 +153,8 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     /// `frame_index` counts from 0 to `frames_in_flight` − 1 and names the set of buffers to write.
     ///
     /// # Errors
-    /// If `frame_index` is out of range or nothing was selected yet.
+    /// If `frame_index` is out of range, nothing was selected yet, the view or the far plane makes no sense, or the list
+    /// exceeds the limits that its technique stated.
     ///
     /// # Safety
     /// - `commands` is a primary command buffer of the lent device and queue family, in the recording state.
@@ -139,6 +163,14 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     pub unsafe fn prepare(&mut self, commands: vk::CommandBuffer, frame_index: usize) -> Result<()> {
         let (count, view) = (self.gpu.frames_in_flight, self.view.context("nothing is selected: call update first")?);
         ensure!(frame_index < count, "frame index {frame_index}: expected less than frames_in_flight, {count}");
+        self.frame_index = None;
+        view.check().map_err(Error::msg)?;
+        self.target.check(&view)?;
+        ensure!(self.terrain.holds(&self.list), "the list exceeds its technique's limits: {:?}", self.list.size());
+        ensure!(
+            self.list.submission != Submission::GpuDriven,
+            "the list is for selection on the GPU, not offered here"
+        );
         let mut recording = Recording::of_caller(&self.gpu, commands, frame_index);
         let mut frame = self.look.after(view.time_s).frame(&self.field, &view, self.range);
         frame.camera.clip_from_relative = self.target.clip_from_relative(&view).as_mat4().to_cols_array_2d();
@@ -157,10 +189,11 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     /// that the caller has set, and writes depth. It writes linear colours, and an alpha of 1, or 0.5 on skirts.
     ///
     /// # Errors
-    /// If nothing was prepared.
+    /// If nothing was prepared since the last update.
     ///
     /// # Safety
-    /// - `commands` is in the recording state, inside a pass with the attachments of the [`Target`].
+    /// - `commands` is of the lent device and queue family, in the recording state, inside a pass with the attachments of the
+    ///   [`Target`] and one view, with viewport and scissor set.
     /// - It runs after the commands of the last [`Self::prepare`], in the same frame.
     pub unsafe fn draw(&self, commands: vk::CommandBuffer) -> Result<()> {
         let frame_index = self.frame_index.context("nothing is prepared: call prepare first")?;
@@ -191,9 +224,9 @@ impl<L: ListSource> EmbeddedTerrain<L> {
         &self.list
     }
 
-    /// The view of the last update.
+    /// The view that the list was selected for; `None` if the last update was for another one.
     pub(crate) fn view(&self) -> Option<&View> {
-        self.view.as_ref()
+        self.view.as_ref().filter(|_| self.is_current)
     }
 
     /// Returns the number of texture tiles that the view needs and that are still being made.

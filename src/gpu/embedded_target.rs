@@ -1,5 +1,6 @@
 //! The caller's attachments, and the clip space of its depth buffer.
 
+use anyhow::{Result, ensure};
 use ash::vk;
 use glam::{DMat4, DVec4};
 
@@ -63,6 +64,17 @@ impl Target {
             y = -y;
         }
         from_rows([clip.row(0), y, z, w])
+    }
+
+    /// Checks the far plane for a view.
+    ///
+    /// # Errors
+    /// If it is not beyond the near plane.
+    pub(super) fn check(&self, view: &View) -> Result<()> {
+        let far = self.depth.and_then(|depth| depth.far_m);
+        let is_beyond = far.is_none_or(|far| far.is_finite() && far > view.near);
+        ensure!(is_beyond, "far plane at {far:?} m: expected a distance beyond the near plane, {} m", view.near);
+        Ok(())
     }
 
     pub(super) fn formats(&self) -> Formats {

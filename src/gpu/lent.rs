@@ -25,11 +25,15 @@ pub struct DeviceHandles {
     pub queue: vk::Queue,
     /// The family of `queue`. Command buffers that draw terrain are of the same family.
     pub queue_family: u32,
-    /// The caller's allocator; `None`: the renderer allocates device memory by itself.
+    /// The caller's allocator; `None`: the renderer allocates device memory by itself. It is locked while the renderer is made
+    /// and dropped: the caller does not hold the lock then.
     pub allocator: Option<Arc<Mutex<Allocator>>>,
     /// True if the instance has `VK_EXT_debug_utils`: then every object and pass is named.
     pub debug_utils: bool,
 }
+
+/// Most frames of a caller that may be under way at once. Each has buffers of its own.
+const MAX_FRAMES_IN_FLIGHT: usize = 16;
 
 impl Gpu {
     /// Wraps a caller's device, for at most `frames_in_flight` frames under way at once.
@@ -44,7 +48,8 @@ impl Gpu {
         requirements: &Requirements,
         frames_in_flight: usize,
     ) -> Result<Arc<Self>> {
-        ensure!(frames_in_flight > 0, "frames in flight: expected 1 or more, found 0");
+        let is_allowed = (1..=MAX_FRAMES_IN_FLIGHT).contains(&frames_in_flight);
+        ensure!(is_allowed, "frames in flight: expected 1 to {MAX_FRAMES_IN_FLIGHT}, found {frames_in_flight}");
         let DeviceHandles { entry, instance, physical_device, device: raw, queue, queue_family, .. } = handles;
         // SAFETY: the caller vouches for the handles.
         unsafe { requirements.check(&instance, physical_device, queue_family)? };

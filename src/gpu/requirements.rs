@@ -215,6 +215,41 @@ impl Requirements {
             !properties.optimal_tiling_features.contains(flags)
         };
         let missing = uses.into_iter().chain(depth).filter(is_missing);
-        missing.map(|(format, _, purpose)| format!("{format:?} as {purpose}")).collect()
+        let missing = missing.map(|(format, _, purpose)| format!("{format:?} as {purpose}"));
+        missing.chain(missing_conventions(&formats)).chain(missing_samples(&formats, instance, raw)).collect()
     }
+}
+
+/// Returns what no device offers: a stencil attachment without stencil, and colours that are not fractions.
+fn missing_conventions(formats: &Formats) -> impl Iterator<Item = String> + use<> {
+    use vk::Format as F;
+    let stencil = [F::UNDEFINED, F::D16_UNORM_S8_UINT, F::D24_UNORM_S8_UINT, F::D32_SFLOAT_S8_UINT];
+    let stencil =
+        (!stencil.contains(&formats.stencil)).then(|| format!("{:?} as a stencil attachment", formats.stencil));
+    let is_depth = formats.depth.is_none_or(|depth| depth != F::S8_UINT);
+    let depth = (!is_depth).then(|| "S8_UINT as a depth attachment".to_string());
+    let name = format!("{:?}", formats.colour);
+    let is_integer = name.ends_with("INT") || name.ends_with("SCALED");
+    let colour = is_integer.then(|| format!("{name} as an attachment of linear colours"));
+    stencil.into_iter().chain(depth).chain(colour)
+}
+
+/// Returns the attachments that the device does not offer with this number of samples.
+fn missing_samples(formats: &Formats, instance: &ash::Instance, raw: vk::PhysicalDevice) -> Vec<String> {
+    use vk::ImageUsageFlags as Usage;
+    let samples = formats.samples;
+    if samples.as_raw().count_ones() != 1 {
+        return vec![format!("{samples:?} as one number of samples")];
+    }
+    let depth = formats.depth.map(|depth| (depth, Usage::DEPTH_STENCIL_ATTACHMENT));
+    let is_missing = |&(format, usage): &(vk::Format, Usage)| {
+        let (kind, tiling, flags) = (vk::ImageType::TYPE_2D, vk::ImageTiling::OPTIMAL, vk::ImageCreateFlags::empty());
+        // SAFETY: the physical device is of this instance.
+        let limits =
+            unsafe { instance.get_physical_device_image_format_properties(raw, format, kind, tiling, usage, flags) };
+        // A format that is no attachment at all is reported by itself.
+        limits.is_ok_and(|limits| !limits.sample_counts.contains(samples))
+    };
+    let attachments = [(formats.colour, Usage::COLOR_ATTACHMENT)].into_iter().chain(depth);
+    attachments.filter(is_missing).map(|(format, _)| format!("{format:?} with {samples:?} samples")).collect()
 }

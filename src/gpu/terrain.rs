@@ -168,12 +168,17 @@ impl Terrain {
         self.gpu_selector.as_ref()
     }
 
+    /// Returns true if a list is within the limits that its technique stated.
+    pub(super) fn holds(&self, list: &DrawList) -> bool {
+        self.limits.hold(&list.size())
+    }
+
     /// Writes the data of a part of a frame for the device.
     ///
     /// # Panics
     /// If the list exceeds the limits that its technique stated.
     pub(super) fn write(&mut self, slot: usize, frame: &Frame, list: &DrawList, part: &Part) {
-        assert!(self.limits.hold(&list.size()), "the list fits its technique's limits: {:?}", list.size());
+        assert!(self.holds(list), "the list fits its technique's limits: {:?}", list.size());
         self.slots[slot].write(frame, list, part);
     }
 

@@ -23,7 +23,7 @@ impl Settings {
                 let known: Vec<_> = entry.settings.iter().map(|s| s.key).collect();
                 return Err(format!("{} has no setting {key}, expected one of: {}", entry.name, known.join(", ")));
             };
-            slot.0.check(value)?;
+            slot.0.check(value).map_err(|why| format!("{}: {why}", entry.name))?;
             slot.1 = value.clone();
         }
         Ok(Self { variant: variant.map(|v| v.name), values, progress: Progress::default() })

@@ -56,9 +56,13 @@ impl ScenePlanBuilder<'_> {
     /// Makes the plan.
     ///
     /// # Errors
-    /// If the field exceeds a limit of the device, or the look's texture bytes do not hold the smallest working set.
+    /// If the field exceeds a limit of the device, the overlay is empty, or the look's texture bytes do not hold the smallest
+    /// working set.
     pub fn build(self) -> Result<ScenePlan, String> {
         let Self { field, look, limits, overlay, requirements, windowed, measured } = self;
+        if overlay.is_some_and(|size| size.contains(&0)) {
+            return Err("overlay: expected at least one pixel a side".to_string());
+        }
         let (stored, is_endless) = (field.stored(), field.procedural().is_some());
         let page_shift = page_shift(stored, &limits);
         let drape = look.drape_over(field);

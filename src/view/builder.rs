@@ -16,6 +16,7 @@ use super::{Lens, Metric, Tolerance, View};
 /// let view = View::builder().eye(DVec3::new(0.0, 500.0, 0.0)).look_at(DVec3::ZERO).tolerance_px(2.0).build()?;
 /// assert_eq!(view.forward(), DVec3::NEG_Y);
 /// assert!(View::builder().fov_deg(180.0).build().is_err());
+/// assert!(View::builder().look_at(DVec3::ZERO).build().is_err());
 /// # Ok::<(), String>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +45,32 @@ impl View {
     /// Returns a builder with default values.
     pub fn builder() -> ViewBuilder {
         ViewBuilder::default()
+    }
+
+    /// Checks the numbers of a view.
+    ///
+    /// # Errors
+    /// If a position is not finite, a side of the picture is 0, the near plane or the tolerance is not positive, the field
+    /// of view is not between 0 and 180°, or an orthographic far plane is not beyond the near plane.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { eye, world_from_eye, lens, size, near, tolerance, time_s } = *self;
+        let is_positive = |value: f64| value.is_finite() && value > 0.0;
+        let is_lens = match lens {
+            Lens::Perspective { fov_x } => fov_x > 0.0 && fov_x < std::f64::consts::PI,
+            Lens::Orthographic { width, far } => is_positive(width) && far.is_finite() && far > near,
+        };
+        let checks = [
+            (eye.is_finite() && world_from_eye.is_finite(), "expected a finite eye and rotation"),
+            (size.iter().all(|&side| side > 0), "expected at least one pixel a side"),
+            (is_positive(near), "expected a near plane in front of the eye"),
+            (
+                is_lens,
+                "expected a field of view between 0 and 180°, or a positive width and a far plane beyond the near one",
+            ),
+            (tolerance.px > 0.0, "expected a positive tolerance"),
+            (time_s.is_finite(), "expected a finite time"),
+        ];
+        checks.iter().find(|(holds, _)| !holds).map_or(Ok(()), |(_, why)| Err(format!("view: {why}")))
     }
 }
 
@@ -116,30 +143,15 @@ impl ViewBuilder {
     /// Returns the view.
     ///
     /// # Errors
-    /// If a position is not finite, a side of the picture is 0, the near plane or the tolerance is not positive, the field
-    /// of view is not between 0 and 180°, or an orthographic far plane is not beyond the near plane.
+    /// As [`View::check`]; or the point to look at is not finite, or is the eye.
     pub fn build(self) -> Result<View, String> {
         let mut view = self.view;
         if let Some(target) = self.target {
+            if !target.is_finite() || target == view.eye {
+                return Err(format!("view: expected a point to look at that is not the eye, found {target}"));
+            }
             view.world_from_eye = View::looking_along(target - view.eye);
         }
-        let View { eye, size, near, tolerance, time_s, .. } = view;
-        let is_positive = |value: f64| value.is_finite() && value > 0.0;
-        let is_lens = match view.lens {
-            Lens::Perspective { fov_x } => fov_x > 0.0 && fov_x < std::f64::consts::PI,
-            Lens::Orthographic { width, far } => is_positive(width) && far.is_finite() && far > near,
-        };
-        let checks = [
-            (eye.is_finite() && view.world_from_eye.is_finite(), "expected a finite eye and rotation"),
-            (size.iter().all(|&side| side > 0), "expected at least one pixel a side"),
-            (is_positive(near), "expected a near plane in front of the eye"),
-            (
-                is_lens,
-                "expected a field of view between 0 and 180°, or a positive width and a far plane beyond the near one",
-            ),
-            (tolerance.px > 0.0, "expected a positive tolerance"),
-            (time_s.is_finite(), "expected a finite time"),
-        ];
-        checks.iter().find(|(holds, _)| !holds).map_or(Ok(view), |(_, why)| Err(format!("view: {why}")))
+        view.check().map(|()| view)
     }
 }

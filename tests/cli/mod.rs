@@ -249,6 +249,31 @@ fn help_names_every_technique() {
     }
 }
 
+#[test]
+fn help_lists_the_settings_of_a_named_technique() {
+    for entry in cuesta::internal::lod::TECHNIQUES {
+        for words in
+            [vec!["--technique".to_string(), entry.name.to_string()], vec![format!("--technique={}", entry.name)]]
+        {
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            let help = stdout(&cuesta(folder().path(), &[&["export", "--help"], &words[..]].concat()));
+            assert!(entry.settings.iter().all(|s| help.contains(&format!("--set {}=", s.key))), "{words:?}: {help}");
+            assert!(entry.variants.iter().all(|v| help.contains(&format!("{}:{}", entry.name, v.name))), "{help}");
+        }
+    }
+}
+
+/// Views and lights that make no sense are refused, whatever else would be drawn.
+#[test]
+fn angles_are_finite_and_the_eye_looks_elsewhere() {
+    let export = ["export", "demo", "-o", "m.obj"];
+    for (flag, value) in [("--yaw", "nan"), ("--pitch", "inf"), ("--roll", "-inf")] {
+        refused(folder().path(), &[&export[..], &[flag, value]].concat(), &[flag, "degrees"]);
+    }
+    let at_itself = ["--eye", "5000,3000,5000", "--look", "5000,3000,5000"];
+    refused(folder().path(), &[&export[..], &at_itself].concat(), &["--look", "another point"]);
+}
+
 #[cfg(not(feature = "vulkan"))]
 #[test]
 fn without_vulkan_bench_says_so() {

@@ -3,12 +3,19 @@
 #[path = "../../examples/embed.rs"]
 mod example;
 
+use std::sync::Arc;
+
 use ash::vk;
-use cuesta::embed::{DepthTarget, Target, TerrainRenderer};
+use cuesta::embed::{DepthTarget, DeviceHandles, Target, TerrainDescription, TerrainRenderer};
+use cuesta::internal::gpu::{Gpu, frames};
+use cuesta::internal::height::demo;
 use cuesta::internal::plan::Look;
+use cuesta::internal::view::View;
+use glam::DVec3;
 
 use self::example::{FRAMES, Options, Outcome};
 use super::{difference, golden, on_device};
+use crate::prepared;
 
 /// Draws the example with some options, without messages of the validation layers.
 fn render(options: Options) -> Outcome {
@@ -144,6 +151,15 @@ fn requirements_are_stated_and_checked() {
         let wrong = Target { colour: vk::Format::BC1_RGB_SRGB_BLOCK, depth, ..target };
         let error = check(&wrong, 1000).unwrap_err();
         assert_eq!(error.device, candidate.name);
+        let refused = |target: &Target| check(target, gpu.queue_family).unwrap_err().to_string();
+        let samples = [vk::SampleCountFlags::TYPE_64, vk::SampleCountFlags::empty(), vk::SampleCountFlags::from_raw(6)];
+        for samples in samples {
+            let text = refused(&Target { samples, ..target });
+            assert!(text.contains("samples"), "{samples:?}: {text}");
+        }
+        let stencil = target.depth.map(|depth| DepthTarget { has_stencil: true, ..depth });
+        assert!(refused(&Target { depth: stencil, ..target }).contains("D32_SFLOAT as a stencil"));
+        assert!(refused(&Target { colour: vk::Format::R8G8B8A8_UINT, ..target }).contains("R8G8B8A8_UINT"));
         let text = error.to_string();
         for part in ["BC1_RGB_SRGB_BLOCK as a colour", "R8G8B8A8_SRGB as a depth", "graphics in queue family 1000"] {
             assert!(text.contains(part), "{text}");
@@ -158,5 +174,95 @@ fn requirements_are_stated_and_checked() {
         assert!(
             names(&target, true).contains(&"fillModeNonSolid") && !names(&target, false).contains(&"fillModeNonSolid")
         );
+    });
+}
+
+/// Terrain on a device of the tests, as a host lends it. The device is left idle.
+fn lent(gpu: &Arc<Gpu>, technique: &str, target: Target) -> anyhow::Result<TerrainRenderer> {
+    let handles = DeviceHandles {
+        entry: gpu.instance.entry.clone(),
+        instance: gpu.instance.raw.clone(),
+        physical_device: gpu.candidate.raw,
+        device: gpu.raw.clone(),
+        queue: gpu.queue,
+        queue_family: gpu.queue_family,
+        allocator: Some(Arc::clone(&gpu.allocator)),
+        debug_utils: gpu.instance.has_debug_utils,
+    };
+    let field = Arc::new(demo::demo());
+    let technique = prepared::technique(&field, technique, &[]);
+    let (look, frames_in_flight) = (Look::default(), 1);
+    let description = TerrainDescription { field, technique, look, overlay: None, target, frames_in_flight };
+    // SAFETY: the device of the tests has the features of all targets and outlives the terrain.
+    #[allow(unsafe_code)]
+    unsafe {
+        TerrainRenderer::from_raw(handles, description)
+    }
+}
+
+fn view_to(target: DVec3) -> View {
+    View::builder().eye(DVec3::new(12_800.0, 4500.0, 27_000.0)).look_at(target).size(320, 180).build().unwrap()
+}
+
+/// Calls out of order and views that make no sense are errors, before anything is recorded.
+#[test]
+#[allow(unsafe_code)]
+fn calls_out_of_order_are_errors() {
+    let refusal = |result: anyhow::Result<()>| result.unwrap_err().to_string();
+    let none = vk::CommandBuffer::null();
+    on_device(|gpu| {
+        let target = Target::new(vk::Format::R8G8B8A8_SRGB, vk::Format::D32_SFLOAT);
+        let mut terrain = lent(gpu, "geomipmap", target).unwrap();
+        let view = view_to(DVec3::new(12_800.0, 1000.0, 12_800.0));
+        // SAFETY: refused before a command is recorded.
+        unsafe {
+            assert!(refusal(terrain.prepare(none, 0)).contains("call update first"));
+            terrain.update(&view);
+            assert!(refusal(terrain.draw(none)).contains("call prepare first"));
+            assert!(refusal(terrain.prepare(none, 1)).contains("less than frames_in_flight"));
+            terrain.update(&View { near: f64::NAN, ..view });
+            assert!(refusal(terrain.prepare(none, 0)).contains("near plane"));
+        }
+        let far_m = Some(view.near);
+        let mut short =
+            lent(gpu, "geomipmap", Target { depth: target.depth.map(|d| DepthTarget { far_m, ..d }), ..target });
+        let short = short.as_mut().unwrap();
+        short.update(&view);
+        // SAFETY: refused before a command is recorded.
+        unsafe {
+            assert!(refusal(short.prepare(none, 0)).contains("beyond the near plane"));
+        }
+    });
+}
+
+/// An update needs a new `prepare` before `draw`. If it keeps an earlier selection, whose uploads are yet to come, it
+/// certifies no error.
+#[test]
+#[allow(unsafe_code)]
+fn a_selection_of_an_earlier_view_has_no_certified_error() {
+    on_device(|gpu| {
+        let target = Target::new(vk::Format::R8G8B8A8_SRGB, vk::Format::D32_SFLOAT);
+        let mut terrain = lent(gpu, "smooth-tiles", target).unwrap();
+        let [first, second] = [12_800.0, 20_000.0].map(|x| view_to(DVec3::new(x, 1000.0, 12_800.0)));
+        terrain.update(&first);
+        let certified = terrain.stats();
+        assert_eq!(certified.error_bound_px, Some(1.0), "{certified:?}");
+        terrain.update(&second);
+        let kept = terrain.stats();
+        assert_eq!((kept.triangles, kept.error_bound_px), (certified.triangles, None), "{kept:?}");
+        terrain.update(&first);
+        assert_eq!(terrain.stats(), certified);
+        let mut drawn = lent(gpu, "geomipmap", target).unwrap();
+        frames::once(gpu, |recording| {
+            drawn.update(&first);
+            // SAFETY: a primary command buffer outside of rendering, submitted and waited for here.
+            unsafe { drawn.prepare(recording.commands, 0)? };
+            drawn.update(&second);
+            // SAFETY: refused before a command is recorded.
+            let refused = unsafe { drawn.draw(recording.commands) };
+            assert!(refused.unwrap_err().to_string().contains("call prepare first"));
+            Ok(())
+        })
+        .unwrap();
     });
 }
