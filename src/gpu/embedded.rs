@@ -66,8 +66,8 @@ pub struct EmbeddedTerrain<L> {
     list: DrawList,
     /// The view of the last update.
     view: Option<View>,
-    /// True if the list was selected for that view, false if it is that of an earlier update.
-    is_current: bool,
+    /// The view that the list was selected for: that of the last update or of an earlier one.
+    selected_view: Option<View>,
     /// True once the uploads of the list are recorded.
     is_uploaded: bool,
     /// The frame of the last [`Self::prepare`].
@@ -123,7 +123,7 @@ impl<L: ListSource> EmbeddedTerrain<L> {
             range,
             list,
             view: None,
-            is_current: false,
+            selected_view: None,
             is_uploaded: false,
             frame_index: None,
             gpu,
@@ -137,11 +137,11 @@ impl<L: ListSource> EmbeddedTerrain<L> {
     /// After an update, `draw` needs a new `prepare`.
     pub fn update(&mut self, view: &View) {
         let is_pending = self.view.is_some() && !self.is_uploaded && !self.list.uploads.is_empty();
-        self.is_current = !is_pending || self.view == Some(*view);
         (self.view, self.frame_index) = (Some(*view), None);
         if is_pending {
             return;
         }
+        self.selected_view = Some(*view);
         self.list.clear();
         self.technique.select(view, &mut self.list);
         self.is_uploaded = false;
@@ -226,7 +226,7 @@ impl<L: ListSource> EmbeddedTerrain<L> {
 
     /// The view that the list was selected for; `None` if the last update was for another one.
     pub(crate) fn view(&self) -> Option<&View> {
-        self.view.as_ref().filter(|_| self.is_current)
+        self.selected_view.as_ref().filter(|_| self.selected_view == self.view)
     }
 
     /// Returns the number of texture tiles that the view needs and that are still being made.
